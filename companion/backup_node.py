@@ -3,15 +3,15 @@
 A vehicle that must keep to its plan needs a set-point every 20 ms. Without one its autopilot flies on along
 the last set-point for a time-out and then brakes: beside its plan, and in the way of others that rely on it.
 So a second, small program receives what its companion sends: plans on the swarm link, set-points on the
-autopilot's link. While these arrive it sends no set-points. When they stop, and the autopilot is still in the
-mode in which it follows set-points, the backup node sends those of the newest committed plan, to its end and
-for some seconds of hover; then the autopilot's own failsafe applies. A companion that returns continues the
-same plan.
+autopilot's link. While set-points arrive the backup node sends none. When they stop, and the autopilot is
+still in the mode in which it follows set-points, the backup node sends those of the newest committed plan, to
+the plan's end and for ``certified.backup_hover_us`` of hover; then the autopilot's own failsafe applies. A
+companion that returns continues the same plan.
 
 The backup node continues only a plan that is known to be flown: the companion's last set-point must agree
-with the plan that the backup node holds, by its own clock and in its own local frame. It must start before
-the companion steers; otherwise it waits for the next plan. An order to land, a farewell, another mode, a
-disarmed vehicle or three seconds without a heartbeat discard all plans.
+with the plan that the backup node holds, by its own clock and in its own local frame. The backup node must
+start before the companion steers; otherwise it waits for the next plan. The companion's command to land, its
+farewell, another mode, a disarmed vehicle or three seconds without a heartbeat discard all plans.
 """
 
 from __future__ import annotations
@@ -55,15 +55,15 @@ from mavlink_bridge.wire.signing import Signing
 
 BACKUP: Final[int] = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER
 """Component id of the backup node."""
-_AGREES = 0.3
-"""Largest distance (m) between a set-point and the own plan: what is flown while the set-point travels."""
-_EPOCHS = 4
-"""Largest distance, in epochs, between now and the beginning of a plan that is accepted."""
-_SECOND = 1_000_000
-_SILENT = 4
-"""Number of consecutive missing set-points after which the companion counts as silent."""
-_OF_AUTOPILOT = frozenset((mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN))
-_OF_COMPANION = frozenset(
+_MAX_DEVIATION_M = 0.3
+"""Largest distance at which a set-point agrees with the plan; it covers the flight during its delay."""
+_MAX_EPOCHS_AWAY = 4
+"""Largest time, in epochs, between now and the beginning of a plan that is accepted."""
+_SECOND_US = 1_000_000
+_SILENT_PERIODS = 4
+"""Number of set-point periods without a set-point after which the companion counts as silent."""
+_AUTOPILOT_IDS = frozenset((mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN))
+_COMPANION_IDS = frozenset(
     (mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED, mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
 )
 """Message ids that are received on the autopilot's link, by sender."""
@@ -86,8 +86,8 @@ class BackupNode:
                 lambda identifier, sender, component: (
                     sender == system
                     and (
-                        (component == mavlink.MAV_COMP_ID_AUTOPILOT1 and identifier in _OF_AUTOPILOT)
-                        or (component == COMPONENT and identifier in _OF_COMPANION)
+                        (component == mavlink.MAV_COMP_ID_AUTOPILOT1 and identifier in _AUTOPILOT_IDS)
+                        or (component == COMPONENT and identifier in _COMPANION_IDS)
                     )
                 ),
                 signing,
@@ -103,7 +103,7 @@ class BackupNode:
         }
         self._signing = signing
         self._plans: dict[int, WirePlan] = {}
-        self._flown: tuple[WirePlan, Horizon] | None = None
+        self._cached_horizon: tuple[WirePlan, Horizon] | None = None
         self._received: tuple[int, SetpointLocal] | None = None
         self._beat: tuple[int, Heartbeat] | None = None
         self._local: LocalFrame | None = None
@@ -124,20 +124,20 @@ class BackupNode:
         beat = self._heartbeat(now)
         profile = self._profile(now)
         if profile is None:
-            # Another controller has the vehicle, or may have it: plans made before no longer count.
+            # Another controller steers the vehicle, or may do so: earlier plans are no longer flown.
             self._forget()
         if now < self._next or profile is None or self._local is None or self._received is None:
             return beat
         period = self._config.rates.setpoint_us
         since, last = self._received
-        if now - since <= _SILENT * period:
+        if now - since <= _SILENT_PERIODS * period:
             return beat
         horizon = self._horizon(now)
         if horizon is None or now > horizon.end + self._config.certified.backup_hover_us:
             return beat
         self._next = now + period
         self.carried += 1
-        # The yaw stays as it was: the target is not known here.
+        # The target is not known here, so the yaw stays at the companion's last one.
         yaw = Yaw(self._local.yaw_to_fleet(last.yaw), 0.0, 0.0)
         time = now + self._config.setpoint_lead_us
         mask = profile.setpoint_mask
@@ -148,11 +148,12 @@ class BackupNode:
         """Return a heartbeat once a second: routers learn the route from it, and operators see the node."""
         if now < self._next_beat:
             return []
-        self._next_beat = now + _SECOND
+        self._next_beat = now + _SECOND_US
         beat = onboard_heartbeat(self._own)
         return [Datagram("autopilot", self._codecs["autopilot"].encode(beat))]
 
     def _receive(self, now: int, message: Message) -> None:
+        """Receive a message of the companion or of its autopilot."""
         match message:
             case Heartbeat():
                 self._beat = now, message
@@ -163,11 +164,11 @@ class BackupNode:
             case CommandLong() if message.command == mavlink.MAV_CMD_NAV_LAND:
                 self._forget()
             case Tunnel():
-                self._file(now, message)
+                self._store_plan(now, message)
             case _:
                 pass
 
-    def _file(self, now: int, message: Tunnel) -> None:
+    def _store_plan(self, now: int, message: Tunnel) -> None:
         """Store a plan of the companion; discard all plans on a farewell, after which the companion lands."""
         try:
             if message.payload_type == ROSTER and unpack_roster(message.payload).farewell:
@@ -177,7 +178,7 @@ class BackupNode:
             plan = unpack_plan(message.payload)
         except PlanWireError:
             return
-        near = abs(plan.epoch - now) <= _EPOCHS * self._config.certified.epoch_us
+        near = abs(plan.epoch - now) <= _MAX_EPOCHS_AWAY * self._config.certified.epoch_us
         if plan.origin != self._fleet.fingerprint or not rests(plan) or not near:
             return
         self._plans[plan.epoch] = plan
@@ -191,26 +192,27 @@ class BackupNode:
         if epoch is None:
             return None
         plan = self._plans[epoch]
-        if self._flown is None or self._flown[0] is not plan:
-            self._flown = plan, horizon_of(plan)
-        return self._flown[1]
+        if self._cached_horizon is None or self._cached_horizon[0] is not plan:
+            self._cached_horizon = plan, horizon_of(plan)
+        return self._cached_horizon[1]
 
     def _agrees(self, now: int, message: SetpointLocal) -> bool:
-        """Return whether the set-point of the companion agrees with the own plan."""
+        """Return whether the companion's set-point agrees with the stored plan; False without a plan."""
         horizon = self._horizon(now)
         if horizon is None or self._local is None:
             return False
         planned = self._local.position_to_local(horizon.at(now + self._config.setpoint_lead_us).position)
         off = planned - np.array(message.position)
         # Written so that a NaN does not agree.
-        return bool(off @ off <= _AGREES**2)
+        return bool(off @ off <= _MAX_DEVIATION_M**2)
 
     def _forget(self) -> None:
+        """Discard all plans and the last set-point; nothing is sent until both have been received again."""
         self._plans.clear()
         self._received = None
 
     def _profile(self, now: int) -> Profile | None:
-        """Return the autopilot's profile if it is armed and follows set-points; else None."""
+        """Return the autopilot's profile; None unless it is connected, armed and follows set-points."""
         if self._beat is None or now - self._beat[0] > HEARTBEAT_LOST:
             return None
         beat = self._beat[1]

@@ -28,20 +28,20 @@ from mavlink_bridge.node import Datagram
 ONLOOKER: Final[int] = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER4
 """Component id of the shadow companion."""
 REQUESTS = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)
-"""Commands that change nothing in a vehicle's behaviour."""
+"""Commands that may be sent, because they do not change the vehicle's behaviour."""
 
 
-class _Asking(Onlooker):
-    """Onlooker that sends requests. ``lacking``: the input that a flight would wait for before take-off."""
+class _RequestingOnlooker(Onlooker):
+    """Onlooker that sends requests. ``lacking``: missing input that would delay a take-off, or ""."""
 
     lacking = ""
 
     def __init__(self, config: CompanionConfig, own: Source, origin_altitude: float) -> None:
-        # The answers go to this component: the companion may send requests as well.
+        # With its own component id the answers do not mix with those to the companion's requests.
         super().__init__(config, own._replace(component=ONLOOKER), origin_altitude)
 
     def step(self, now: int, view: View) -> list[Message]:
-        """Return requests for messages and parameters alone."""
+        """Update the phase; return nothing but requests for messages and parameters."""
         super().step(now, view)
         self.lacking = self._readiness.missing(view, go=self._height is not None)
         wishes = self._readiness.wishes(now) if self._readiness.received else []
@@ -51,17 +51,17 @@ class _Asking(Onlooker):
 class DryRun(ShadowCompanion):
     """Companion that sends nothing that would change what the vehicle or another node does."""
 
-    pilot: _Asking
-    pilots = _Asking
+    pilot: _RequestingOnlooker
+    pilots = _RequestingOnlooker
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:
         super()._encode(**links)
         own = Source(self.system, ONLOOKER)
-        told: dict[str, list[Message]] = {
+        permitted: dict[str, list[Message]] = {
             link: [m._replace(source=own) for m in messages if _changes_nothing(m)]
             for link, messages in links.items()
         }
-        return Companion._encode(self, **told)
+        return Companion._encode(self, **permitted)
 
 
 def _changes_nothing(message: Message) -> bool:

@@ -11,7 +11,7 @@ class CompanionError(Exception):
 
 
 class ShapeError(CompanionError):
-    """Vector of the wrong size, or with NaN, for the solver, which would not have detected it."""
+    """Vector of the wrong size, or with NaN, for the QP; PIQP would not detect it."""
 
 
 class SolverError(CompanionError):
@@ -24,7 +24,7 @@ class SolverError(CompanionError):
 
 
 class SurfaceError(CompanionError):
-    """Unusable surface of a user: for example, its function raises or returns a NaN."""
+    """Unusable user-defined surface: for example, its function raises or returns a NaN."""
 
 
 class CertificateError(CompanionError):

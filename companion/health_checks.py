@@ -13,39 +13,39 @@ from companion.telemetry.status_text import Severity, StatusReporter
 from companion.values.phase import STEERED
 from companion.world import View, World
 
-_PERIOD = 100_000
-"""Period of the health checks, µs."""
-_PLAIN = str.maketrans({"²": "2", "³": "3", "°": "deg"})
+_PERIOD_US = 100_000
+"""Least time between two health checks."""
+_TO_ASCII = str.maketrans({"²": "2", "³": "3", "°": "deg"})
 """Replacements for STATUSTEXT, which is ASCII."""
 
 
 class Reactions:
-    """Pending reactions to present concerns; a reaction in progress outlives its concern."""
+    """Pending reactions to present concerns; a reaction already ordered continues when its concern ends."""
 
     def __init__(self) -> None:
-        self._owed: dict[str, Reaction] = {}
+        self._pending: dict[str, Reaction] = {}
 
     def note(self, change: Change) -> None:
         """Record a concern that began or ended."""
         concern = change.concern
         if not change.begins:
-            self._owed.pop(concern.name, None)
+            self._pending.pop(concern.name, None)
         elif concern.reaction is not Reaction.TELL:
-            self._owed[concern.name] = concern.reaction
+            self._pending[concern.name] = concern.reaction
 
     def follow(self, pilot: Pilot) -> None:
-        """Order the most severe pending reaction.
+        """Order the most severe pending reaction while set-points steer the vehicle, and clear all.
 
         If the concern began during the take-off, or while another controller had the vehicle, its reaction
         waits until the companion steers.
         """
-        if not self._owed or pilot.phase not in STEERED:
+        if not self._pending or pilot.phase not in STEERED:
             return
-        if Reaction.LAND in self._owed.values():
+        if Reaction.LAND in self._pending.values():
             pilot.alight()
         else:
             pilot.come_back()
-        self._owed.clear()
+        self._pending.clear()
 
 
 class HealthChecks:
@@ -76,13 +76,13 @@ class HealthChecks:
     def step(self, now: int, view: View, late: int) -> None:
         """Run the checks if they are due.
 
-        ``late``: time (µs) since the set-point was due; negative before.
+        ``late``: time (µs) since the next set-point was due; negative before.
         """
         self._largest_delay = max(self._largest_delay, late)
         if now < self._next:
             return
-        self._next = now + _PERIOD
-        for change in self.monitor.look(self._situation(now, view)):
+        self._next = now + _PERIOD_US
+        for change in self.monitor.look(self._inputs(now, view)):
             concern = change.concern
             if concern.name != "target":  # ``report_silence`` reports the target
                 self._reporter.report(concern.severity, concern.text, begins=change.begins)
@@ -91,7 +91,8 @@ class HealthChecks:
         self._reactions.follow(self._pilot)
         self._report_limits()
 
-    def _situation(self, now: int, view: View) -> HealthInputs:
+    def _inputs(self, now: int, view: View) -> HealthInputs:
+        """Return the inputs of the health monitor at ``now`` (µs)."""
         world, pilot, avoidance = self._world, self._pilot, self._avoidance
         world.neighbours.listen(now, view.own)
         return HealthInputs(
@@ -117,7 +118,7 @@ class HealthChecks:
         limits = self._pilot.limits
         new = min(limits.said - self._reported, len(limits.remarks))
         for text in list(limits.remarks)[len(limits.remarks) - new :]:
-            self._reporter.say(Severity.WARNING, text.translate(_PLAIN))
+            self._reporter.say(Severity.WARNING, text.translate(_TO_ASCII))
         self._reported = limits.said
 
 

@@ -47,6 +47,7 @@ class Companion:
     """
 
     pilots: ClassVar[type[Pilot]] = Pilot
+    """Class of ``pilot``; subclasses replace it."""
 
     def __init__(
         self,
@@ -136,7 +137,7 @@ class Companion:
     def shed(self) -> Sequence[int]:
         """Remove and return the stopwatch readings (ns), and empty the plan log.
 
-        For processes that run for days.
+        Call this regularly in processes that run for days; both grow with every plan.
         """
         self.avoidance.shed()
         return self._times.shed()
@@ -176,7 +177,7 @@ class Companion:
         self._checks.start(now)
 
     def _has_to_act(self, now: int) -> bool:
-        """Return whether anything is due; in the escort a step before the next deadline only receives."""
+        """Return whether anything is due; in phase ESCORT a step before the next deadline only receives."""
         return (
             self.pilot.phase is not Phase.ESCORT
             or not self.avoidance.idle(now)
@@ -218,6 +219,7 @@ class Companion:
         return dict.fromkeys(settings.links, messages)
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:
+        """Return one datagram for each link that has messages."""
         out = []
         for link, messages in links.items():
             if messages:

@@ -21,8 +21,8 @@ from mavlink_bridge.messages import Message, SetpointLocal
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
 
-_ALWAYS_ANEW = 1e-6
-"""Distance (m) between vehicle and plan beyond which a plan begins anew at the vehicle."""
+_ALWAYS_ANCHOR_TUBE_M = 1e-6
+"""Value of ``guard.tube``: every plan begins at the vehicle, not on the previous plan."""
 
 
 class Onlooker(Pilot):
@@ -58,7 +58,7 @@ class Onlooker(Pilot):
         """Do nothing: another controller lands the vehicle."""
 
     def step(self, now: int, view: View) -> list[Message]:
-        """Update the phase; return no commands, ever."""
+        """Update the phase; return no commands."""
         self.vehicle.tick(now)
         self.waiting_for = self._readiness.unseen(view)
         self.phase = Phase.CONNECT if self.waiting_for else Phase.ESCORT
@@ -68,8 +68,8 @@ class Onlooker(Pilot):
 class ShadowCompanion(Companion):
     """Companion that sends nothing, for the vehicle of ``system``.
 
-    ``would``: the set-points that it would have sent since the list was last emptied. Raises CompanionError
-    for ``avoidance: certified``.
+    ``would``: the set-points that it would have sent, until the caller empties the list. Raises
+    CompanionError for ``avoidance: certified``.
     """
 
     pilots = Onlooker
@@ -85,9 +85,9 @@ class ShadowCompanion(Companion):
     ) -> None:
         if config.avoidance == "certified":
             raise CompanionError("committed plans cannot be rehearsed; allowed: avoidance 'field'")
-        changes = {"tube": _ALWAYS_ANEW, "blend": None, "astray_us": 0}
+        changes = {"tube": _ALWAYS_ANCHOR_TUBE_M, "blend": None, "astray_us": 0}
         guard = config.guard.model_copy(update=changes)
-        # The vehicle follows another controller's set-points: how it follows them teaches nothing here.
+        # The vehicle follows another controller's set-points, so its tracking error cannot be learnt here.
         config = config.model_copy(update={"guard": guard, "tracking": TrackingConfig()})
         super().__init__(config, system, target_system, fleet, stopwatch, signing)
         self.would: list[SetpointLocal] = []

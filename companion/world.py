@@ -34,16 +34,17 @@ from mavlink_bridge.messages import (
 
 _ORIGIN = np.zeros(3)
 _ORIGIN.flags.writeable = False
-_STEEPEST = 0.1
-"""Least cosine of the pitch in the yaw rate; beyond that pitch a heading has no meaning."""
+_MIN_COS_PITCH = 0.1
+"""Lower bound of the cosine of the pitch in the yaw rate, which is undefined at ±90° of pitch."""
 
 
 class View(NamedTuple):
     """World picture at one time: fleet-local ENU, SI; None where nothing has been received yet.
 
-    ``yaw`` is ENU (rad, counter-clockwise from east); it is also None when it is older than the own state may
-    be. ``target`` is also None when its last message is too old for the target to be followed.
-    ``target_last`` is the target's last state at whatever age: a target that falls silent may still be there.
+    ``yaw`` is ENU (rad, counter-clockwise from east); it is also None when it is older than
+    ``guard.own_stale_us``. ``target`` is also None when its last measurement is older than
+    ``guard.target_stale_us``. ``target_last`` is the target's last state at whatever age: a target that falls
+    silent may still be there.
     """
 
     own: State | None
@@ -52,18 +53,18 @@ class View(NamedTuple):
     local: LocalFrame | None
     target_last: State | None = None
     adrift: int = 0
-    """Age (µs) of the last own position if the frame has changed since and none has followed; else 0."""
+    """Age (µs) of the last own position if it is from before the latest change of the frame; otherwise 0."""
 
     @property
     def own_age(self) -> int:
-        """Age (µs) of the last own position in whatever frame; 0 before the first."""
+        """Age (µs) of the last own position, in the present or an earlier frame; 0 before the first."""
         return self.adrift if self.own is None else self.own.age
 
 
 def reach(config: CompanionConfig) -> float:
-    """Return how far (m) from the own horizon an obstacle can still act.
+    """Return the largest distance (m) from the own horizon at which an obstacle has an effect.
 
-    It covers the field and the tangential band, both grown for closing at v_max.
+    It covers the field and the tangential band, both extended for closing at v_max.
     """
     field, band, speed = config.field, config.tangential, max(config.limits.v_max)
     stopping = 0.0 if field.braking is None else speed**2 / (2.0 * field.braking) + field.reaction * speed
@@ -91,18 +92,18 @@ class World:
         self._yaw: float | None = None
         self._yaw_time = 0
         self._yaw_rate = 0.0
-        self._left: State | None = None
-        self._placed = 0
+        self._last_in_old_frame: State | None = None
+        self._last_position_at = 0
         # Totals of the tracks in the earlier frames.
         self._clock_steps = self._clock_lost = 0
         self.moves = 0
-        """Number of times that the autopilot's origin has moved in flight."""
+        """Number of times that the autopilot's origin has changed after a position was received."""
         self.displaced = 0.0
-        """Displacement (m) of the vehicle in the fleet frame by the last such move; it should be 0."""
+        """Jump (m) of the own position in the fleet frame at the last such change; it should be 0."""
         self.doubt = 0.0
-        """Distance (m) by which the own position may be wrong, beyond the usual error."""
+        """Distance (m) by which the own position may be wrong, beyond the usual error; enlarges obstacles."""
         self.stamp = 0
-        """Last time (µs since its boot) that the own autopilot reported, 0 before the first."""
+        """Last time stamp (µs since boot) of the own autopilot; 0 before the first."""
 
     def receive(self, now: int, link: str, message: Message) -> None:
         """Receive one message from ``link``; a message that does not concern the picture is ignored."""
@@ -124,7 +125,7 @@ class World:
         """Return the view at ``now`` (µs)."""
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
         own, last = self._own.at(now), self.target.last(now)
-        adrift = now - self._placed if own is None and self._left is not None else 0
+        adrift = now - self._last_position_at if own is None and self._last_in_old_frame is not None else 0
         return View(own, yaw, self.target.fresh(last), self._local, last, adrift)
 
     @property
@@ -160,12 +161,12 @@ class World:
         """Return the obstacles near the own ``prediction`` (N + 1, 3), m, aligned with ``now + n·dt``.
 
         They are neighbours and other moving obstacles, the target where it is configured as an obstacle, and
-        fixed and sensed obstacles near the prediction.
+        fixed and sensed obstacles near the prediction. All distances are enlarged by ``doubt``.
         """
         config, field = self.config, self.config.field
         places = None
         if config.avoidance != "certified":
-            # A plan begins on the last plan, or at the vehicle when it has left that plan.
+            # A plan begins on the last plan, or at the vehicle if the vehicle has left the last plan.
             places = prediction[:1] if view.own is None else np.stack([prediction[0], view.own.position])
         obstacles = self.neighbours.obstacles(now, places)
         if len(self._moving):
@@ -228,6 +229,7 @@ class World:
         )
 
     def _receive_own(self, now: int, message: Message) -> None:
+        """Process a position, attitude or origin of the own autopilot."""
         if isinstance(message, LocalPosition | Attitude):
             self.stamp = message.time_boot
         if isinstance(message, LocalPosition):
@@ -236,21 +238,21 @@ class World:
                 self._own.measure(
                     now, place, self._local.velocity_to_fleet(message.velocity_ned), message.time_boot
                 )
-                if self._left is not None:
+                if self._last_in_old_frame is not None:
                     self.moves += 1
-                    self.displaced = float(np.linalg.norm(place - self._left.position))
-                    self._left = None
+                    self.displaced = float(np.linalg.norm(place - self._last_in_old_frame.position))
+                    self._last_in_old_frame = None
         elif isinstance(message, Attitude):
             if self._local is not None:
                 self._yaw = self._local.yaw_to_fleet(message.yaw)
                 self._yaw_time = self._own.when(now, message.time_boot)
-                self._yaw_rate = _turns(message)
+                self._yaw_rate = _yaw_rate_of(message)
         elif isinstance(message, GpsGlobalOrigin):
             origin = (message.latitude, message.longitude, message.altitude)
             if self._origins.counts(now, message) and origin != self._origin:
-                # If two origins arrive before a position, the state left at the first one counts.
-                if self._left is None and (left := self._own.at(now)) is not None:
-                    self._left, self._placed = left, now - left.age
+                # If several origins arrive before a position, the state before the first of them is kept.
+                if self._last_in_old_frame is None and (left := self._own.at(now)) is not None:
+                    self._last_in_old_frame, self._last_position_at = left, now - left.age
                 self._origin = origin
                 self._local = self.fleet.local(*origin)
                 self._clock_steps += self._own.clock_steps
@@ -260,8 +262,8 @@ class World:
                 self.simulated = simulated
 
 
-def _turns(attitude: Attitude) -> float:
+def _yaw_rate_of(attitude: Attitude) -> float:
     """Return the yaw rate, rad/s, counter-clockwise from above."""
     _, q, r = attitude.body_rates
-    level = max(cos(attitude.pitch), _STEEPEST)
+    level = max(cos(attitude.pitch), _MIN_COS_PITCH)
     return -(q * sin(attitude.roll) + r * cos(attitude.roll)) / level

@@ -1,6 +1,6 @@
 """Conversion between MAVLink bytes and values: wire format, units, time, links and the two node loops.
 
-The package is independent of the nodes, and it alone opens sockets for them.
+The package is independent of the nodes. No other package opens sockets for them.
 
 ::
 

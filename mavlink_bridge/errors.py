@@ -1,6 +1,6 @@
 """Exceptions of the bridge.
 
-Bad bytes from outside never raise: they are counted and dropped.
+The codec never raises for bad frames from outside: it counts and drops them.
 """
 
 from __future__ import annotations
@@ -18,15 +18,18 @@ class EncodeError(BridgeError):
 
 
 class LogError(BridgeError):
-    """A tlog that cannot be opened, or that holds no MAVLink."""
+    """A tlog that cannot be created, opened or read, that holds no MAVLink, or a record out of its range."""
 
 
 class ScheduleError(BridgeError):
-    """A period or phase that is not a whole number of base ticks."""
+    """An invalid period, phase, clock or node name of a loop."""
 
 
 class PlanWireError(BridgeError):
-    """A plan that does not fit into 128 bytes, or bytes that are not a plan."""
+    """A value that does not fit into its TUNNEL payload, or bytes that are no such payload.
+
+    The payloads are plans, rosters and uncertainties.
+    """
 
 
 class EndpointError(BridgeError):
@@ -34,7 +37,7 @@ class EndpointError(BridgeError):
 
 
 class LinkError(BridgeError):
-    """An endpoint that cannot be opened: a host without address, a port in use, a missing device."""
+    """An endpoint that cannot be opened: for example a port in use, or a missing device."""
 
 
 class KeyFileError(BridgeError):

@@ -2,8 +2,8 @@
 
 The fleet frame is ENU (x east, y north, z up; m), tangent to WGS84 at an explicit origin. ENU yaw counts
 counter-clockwise from east, NED yaw clockwise from north: yaw_ned = π/2 − yaw_enu. pymap3d computes the
-geodesy. Altitudes are used as given: either mean sea level or ellipsoid height works as long as the whole
-fleet uses the same one, because the geoid is level across a flying site.
+geodesy. Altitudes are used as given, above mean sea level or above the ellipsoid, as long as the whole fleet
+uses the same reference: the height of the geoid is nearly constant across a flying site.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from pymap3d.rcurve import meridian, transverse
 Array = npt.NDArray[np.float64]
 
 _WGS84 = Ellipsoid.from_name("wgs84")
-_MOST_ITERATIONS = 8
-_SETTLED = 1e-6  # m
+_MAX_ITERATIONS = 8
+_CONVERGED_M = 1e-6
 # Swaps x and y and negates z; the matrix is its own inverse.
 _SWAP: Array = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
@@ -52,12 +52,12 @@ def wrap(angle: float) -> float:
 
 
 def yaw_to_ned(yaw_enu: float) -> float:
-    """Convert rad counter-clockwise from east to rad clockwise from north, in (−π, π]."""
+    """Convert yaw from rad counter-clockwise from east to rad clockwise from north, in (−π, π]."""
     return wrap(math.pi / 2 - yaw_enu)
 
 
 def yaw_to_enu(yaw_ned: float) -> float:
-    """Convert rad clockwise from north to rad counter-clockwise from east, in (−π, π]."""
+    """Convert yaw from rad clockwise from north to rad counter-clockwise from east, in (−π, π]."""
     return wrap(math.pi / 2 - yaw_ned)
 
 
@@ -100,13 +100,13 @@ class FleetFrame:
         east, north, up = (float(part) for part in np.asarray(enu, dtype=np.float64))
         latitude, longitude, altitude = self.latitude, self.longitude, self.altitude
         missing = (east, north, up)
-        for _ in range(_MOST_ITERATIONS):
+        for _ in range(_MAX_ITERATIONS):
             latitude += missing[1] * self._degrees_north
             longitude += missing[0] * self._degrees_east
             altitude += missing[2]
             x, y, z = self.to_enu(latitude, longitude, altitude).tolist()
             missing = (east - x, north - y, up - z)
-            if abs(missing[0]) + abs(missing[1]) + abs(missing[2]) < _SETTLED:
+            if abs(missing[0]) + abs(missing[1]) + abs(missing[2]) < _CONVERGED_M:
                 if abs(latitude) > 90:
                     break
                 return latitude, math.remainder(longitude, 360.0), altitude
@@ -117,7 +117,7 @@ class FleetFrame:
 
     @cached_property
     def fingerprint(self) -> int:
-        """8 bits derived from the origin, which detect plans made in another frame, except for one in 256.
+        """8-bit checksum of the origin; it detects plans made in another frame, except for one in 256.
 
         The origin is rounded to the steps of the wire: degE7 and mm.
         """

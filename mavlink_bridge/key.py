@@ -14,11 +14,11 @@ from mavlink_bridge.errors import KeyFileError
 
 LENGTH: Final = 32
 """Length of a key in bytes."""
-_LONGEST: Final = 1024
-# A number with too few digits must not silently become a passphrase.
-_FEWEST_DIGITS: Final = 32
+_MAX_FILE_BYTES: Final = 1024
+_MIN_DIGITS: Final = 32
+"""Hexadecimal digits from which on a line is a key, never a passphrase, so that a cut key is detected."""
 _DIGITS: Final = frozenset("0123456789abcdefABCDEF")
-# 160 random bits in letters that can be typed on a tablet: no digit looks like a letter.
+# 32 characters of 5 random bits each, easy to type on a tablet: without digits that look like letters.
 _LETTERS: Final = "abcdefghijklmnopqrstuvwxyz234567"
 _GROUPS, _GROUP = 8, 4
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
@@ -73,8 +73,8 @@ class Key:
 def read_key(path: Path | str) -> Key:
     """Read the key from a file of one line: 64 hexadecimal digits, or a passphrase.
 
-    Raises KeyFileError, with a message of one line, if the file is missing, if it holds anything else, or if
-    users other than its owner may read it or write to it.
+    Raises KeyFileError, with a message of one line, if the file is missing or unreadable, if it holds
+    anything else, or (POSIX) if its mode gives any permission to users other than its owner.
     """
     text = _text(path)
     line = text.removesuffix("\n").removesuffix("\r")
@@ -82,7 +82,7 @@ def read_key(path: Path | str) -> Key:
         raise KeyFileError(
             f"{path}: holds no key; allowed is one line: {2 * LENGTH} hexadecimal digits, or a passphrase"
         )
-    if len(line) >= _FEWEST_DIGITS and _DIGITS.issuperset(line):
+    if len(line) >= _MIN_DIGITS and _DIGITS.issuperset(line):
         if len(line) != 2 * LENGTH:
             raise KeyFileError(
                 f"{path}: has {len(line)} hexadecimal digits; a key has {2 * LENGTH} (a passphrase has other "
@@ -99,7 +99,7 @@ def create_key(path: Path | str) -> Key:
     """Write a random passphrase to a new file that only its owner may read, and return its key.
 
     The file holds a passphrase and not digits, because ground stations accept nothing else. Raises
-    KeyFileError, with a message of one line.
+    KeyFileError, with a message of one line, if the file exists or cannot be created.
     """
     groups = ("".join(secrets.choice(_LETTERS) for _ in range(_GROUP)) for _ in range(_GROUPS))
     line = "-".join(groups)
@@ -127,9 +127,9 @@ def _text(path: Path | str) -> str:
                     f"{path}: others may read or change it (mode {stat.S_IMODE(found.st_mode):03o}); "
                     f"chmod 600 {path}"
                 )
-            data = file.read(_LONGEST + 1)
-        if len(data) > _LONGEST:
-            raise KeyFileError(f"{path}: holds more than {_LONGEST} bytes; a key is one line")
+            data = file.read(_MAX_FILE_BYTES + 1)
+        if len(data) > _MAX_FILE_BYTES:
+            raise KeyFileError(f"{path}: holds more than {_MAX_FILE_BYTES} bytes; a key is one line")
         return data.decode()
     except UnicodeDecodeError:
         raise KeyFileError(f"{path}: is not text; a key is one line of UTF-8") from None

@@ -21,7 +21,7 @@ class Node(Protocol):
 
     @property
     def name(self) -> str:
-        """Name, unique among the nodes of a run; seeds and log files are named after it."""
+        """Name, unique among the nodes of a run; seeds and names of log files are derived from it."""
         ...
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:

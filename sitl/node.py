@@ -35,7 +35,7 @@ from sitl.autopilot.plant import Plant
 from sitl.autopilot.reception import Reception
 from sitl.autopilot.saved import Saved
 from sitl.autopilot.services import Services
-from sitl.autopilot.trust import Trust
+from sitl.autopilot.trust import SigningSetup
 from sitl.config.autopilot import AutopilotConfig
 from sitl.environment.weather import WeatherConfig
 from sitl.estimation.sensors import Estimate
@@ -68,7 +68,7 @@ _RECEIVED: Final = frozenset(
     )
 )
 # Limit of messages in answer to one datagram; the rest of the datagram is ignored.
-_ANSWERS: Final = 32
+_MAX_ANSWERS: Final = 32
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
 _FIRMWARE: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
 
@@ -180,7 +180,9 @@ class Autopilot:
             self._firmware.set_mode_ack,
         )
         self._signing = signing = _resumed(signing, config, saved)
-        self._trust = Trust(source, signing, config.signing_setup, lambda: self._commander.armed, reporter)
+        self._trust = SigningSetup(
+            source, signing, config.signing_setup, lambda: self._commander.armed, reporter
+        )
         self._services.handlers[SetupSigning] = self._trust.set_up
         received = _RECEIVED | {BY_TYPE[kind].id for kind in self._services.handlers}
         self._codec = Codec(lambda message_id, _system, _component: message_id in received, signing)
@@ -216,8 +218,8 @@ class Autopilot:
         self._plant.move(self._now, armed=self._commander.armed)
         self._watch()
         for datagram in inbox:
-            self._listen(datagram)
-        return self._tell()
+            self._receive(datagram)
+        return self._send()
 
     def _watch(self) -> None:
         was_ready = self._commander.ready
@@ -229,10 +231,10 @@ class Autopilot:
         if self._now >= self._failsafes.next_due:
             self._failsafes.watch(self._now)
 
-    def _listen(self, datagram: Datagram) -> None:
+    def _receive(self, datagram: Datagram) -> None:
         if datagram.link != LINK:
             return
-        enough = len(self._outbox) + _ANSWERS
+        enough = len(self._outbox) + _MAX_ANSWERS
         for message in self._codec.feed(datagram.data, whole=True):
             if len(self._outbox) >= enough:
                 # Answers go to all receivers: excessive requests of one sender would crowd out the others.
@@ -244,7 +246,7 @@ class Autopilot:
         self._trust.watch(self._now)
         self._work_due = self._services.next_due
 
-    def _tell(self) -> list[Datagram]:
+    def _send(self) -> list[Datagram]:
         if self._reached:
             self._missions.tell()
         if self._now >= self._work_due:
@@ -254,7 +256,7 @@ class Autopilot:
         if self._now >= self._telemetry.next_due:
             reported = self._telemetry.collect(self._now, self._snapshots.read(self._now))
             # If there are many answers, the messages sent first are more likely to fit the link.
-            messages = reported + messages if len(messages) > _ANSWERS else messages + reported
+            messages = reported + messages if len(messages) > _MAX_ANSWERS else messages + reported
         if not messages:
             return []
         data = parcels([encoded for message in messages if (encoded := self._encoded(message))])
@@ -297,15 +299,15 @@ class Autopilot:
     # Events and faults, effective from the next step
 
     def begin(self, now: int) -> None:
-        """Mark the goal event at ``now`` (µs, clock of ``step``); the weather's gusts are timed from it."""
+        """Mark the goal event at ``now`` (µs, clock of ``step``), the time origin of the weather's gusts."""
         self._plant.begin(now - (now if self._boot is None else self._boot))
 
     def lose_gps(self) -> None:
-        """Stop GPS: the estimate drifts, and after the firmware's time-out there is no position."""
+        """Stop GPS: the estimate drifts; after the firmware's time-out its position is reported as lost."""
         self._plant.lose_gps()
 
     def regain_gps(self) -> None:
-        """Restore GPS: the estimate converges to it, in one jump if the position had been given up."""
+        """Restore GPS: the estimate converges to GPS, in one jump if its position was reported as lost."""
         self._plant.sensors.gps.regain()
 
     def fail_rotor(self, index: int, left: float) -> None:
@@ -316,7 +318,7 @@ class Autopilot:
         self._plant.vehicle.fail_rotor(index, left)
 
     def shift_gps(self, offset_enu: Vector) -> None:
-        """Set the total GPS error to ``offset_enu`` (m, fleet-local ENU); zero ends it.
+        """Set the error of GPS positions to ``offset_enu`` (m, fleet-local ENU); zero ends the fault.
 
         The estimate follows within some seconds, or jumps after rejecting GPS for seven seconds.
         """
@@ -357,7 +359,7 @@ class Autopilot:
 
     @property
     def airborne(self) -> bool:
-        """Whether it is off the ground; after a touchdown, true until it counts as landed."""
+        """Whether the vehicle is off the ground; after a touchdown, true until it counts as landed."""
         return not self._commander.landed
 
     @property
@@ -382,17 +384,20 @@ class Autopilot:
 
     @property
     def estimate_error(self) -> npt.NDArray[np.float64]:
-        """Estimated minus true position (3,) (m, site NED), the deliberate offset of ``reference``."""
+        """Estimated minus true position (3,) (m, site NED).
+
+        The vehicle is controlled to ``reference`` less this error.
+        """
         return self._plant.estimate_error
 
     @property
     def reference(self) -> Reference | None:
-        """Reference tracked now (site NED, in terms of the estimate), or None."""
+        """Reference requested now (site NED, for the estimated state), or None if there is none."""
         return self._plant.course.reference
 
 
 def _resumed(signing: Signing | None, config: AutopilotConfig, saved: Saved) -> Signing | None:
-    """Return the signing to use, continued after what an earlier run signed."""
+    """Return the signing to use, if any, with timestamps that continue those of an earlier run."""
     if signing is None and config.signing_setup == "obeyed":
         signing = Signing()
     if signing is not None:

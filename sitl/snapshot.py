@@ -94,10 +94,10 @@ class SnapshotReader:
             flavour.echoes_yaw,
             plant.sensors.gps.located,
             plant.sensors.gps.fixed,
-            plant.sensors.gps.strain,
+            plant.sensors.gps.test_ratio,
             plant.sensors.gps.spread,
             plant.sensors.silent(now),
-            self._waking(),
+            self._startup_progress(),
             self._home,
             None if self._battery is None else self._battery.charge,
             self._throttle,
@@ -115,7 +115,7 @@ class SnapshotReader:
         return not self._failsafes.doubts() and self._commander.mode_doubt(now) is None
 
     def _landed_state(self) -> int:
-        """Return the MAV_LANDED_STATE; a descent without a controller is not LANDING."""
+        """Return the MAV_LANDED_STATE; a descent in PX4's position mode is not LANDING."""
         if self._commander.landed:
             state: int = mavlink.MAV_LANDED_STATE_ON_GROUND
         elif self._commander.mode is Mode.POSITION:
@@ -129,7 +129,7 @@ class SnapshotReader:
         follows = guidance.activity is Activity.TRACK or guidance.activity is Activity.GO
         return guidance.wanted(self._now) if follows else None
 
-    def _waking(self) -> float:
+    def _startup_progress(self) -> float:
         """Return the start-up progress of GPS and filter, 0…1."""
         config = self._config
         if self._now >= config.ready_after * 1e6:
@@ -137,13 +137,13 @@ class SnapshotReader:
         return self._now * 1e-6 / config.ready_after if config.startup == "in stages" else 0.0
 
     def _lift(self) -> float:
-        """Return the specific lift (m/s²)."""
+        """Return the rotors' thrust over mass (m/s²); standard gravity on the ground."""
         if self._plant.vehicle.on_ground:
             return GRAVITY
         return GRAVITY * _squares(self._plant.state.rotor_speeds.tolist()) / self._hovering
 
     def _throttle(self) -> float:
-        """Return thrust as a fraction of twice the hover thrust, 0…1."""
+        """Return thrust over twice the hover thrust, at most 1."""
         return min(1.0, 0.5 * _squares(self._plant.state.rotor_speeds.tolist()) / self._hovering)
 
 

@@ -1,8 +1,8 @@
 """PIQP solver: set up once, then only vectors are updated.
 
-One dense QP of n variables is used for each axis in turn. Settled by measurement: there is no preconditioner
-(with scaling on, a wrong update can return SOLVED with a wrong result), the duality gap is checked, infinite
-bounds are real infinities, shapes are validated here because PIQP does not raise on them, and results are
+One dense QP of n variables is used for each axis in turn. Choices confirmed by measurement: no preconditioner
+(with scaling on, a wrong update can return SOLVED with a wrong result), the duality gap is checked, absent
+bounds are infinities, ``QpSolver`` validates shapes because PIQP does not raise on them, and results are
 copied because the next solve overwrites them.
 """
 
@@ -20,7 +20,7 @@ from companion.values.horizon import Array
 class QpSolver:
     """Solver of min ½ xᵀPx + cᵀx subject to h_l ≤ Gx ≤ h_u, x_l ≤ x ≤ x_u.
 
-    P (n, n) and G (m, n), if there is one, are constant.
+    P (n, n) and G (m, n) or None are constant; without G there are no rows h.
     """
 
     def __init__(self, P: Array, G: Array | None = None, max_iter: int = 60) -> None:
@@ -28,7 +28,7 @@ class QpSolver:
         self.rows = 0 if G is None else len(G)
         # At the default gap, 1e-8, the last inputs are wrong by up to 2e-3 m/s²; this gap costs one more
         # iteration.
-        self._solver = _quiet(max_iter, 1e-8, (1e-10, 1e-12))
+        self._solver = _dense_solver(max_iter, 1e-8, (1e-10, 1e-12))
         wide, tall = np.full(self.size, 1.0), np.full(self.rows, 1.0)
         P = np.asfortranarray(P)
         if G is None:
@@ -49,7 +49,7 @@ class QpSolver:
             raise ShapeError(
                 f"c, x_l, x_u must have {self.size} entries, not {len(c)}, {len(x_l)}, {len(x_u)}"
             )
-        # PIQP would treat a NaN bound as absent and report SOLVED; the product finds a NaN in a single pass.
+        # PIQP would treat a NaN bound as absent and report SOLVED. A NaN in any vector makes the sum NaN.
         check = float(c @ (x_u - x_l))
         if self.rows:
             if h_l is None or h_u is None or len(h_l) != self.rows or len(h_u) != self.rows:
@@ -65,7 +65,7 @@ class QpSolver:
 
 
 class Optimum(NamedTuple):
-    """Minimiser (n,) and multipliers (m,) ≥ 0 of the rows, copies."""
+    """Minimiser ``x`` (n,) and ``multipliers`` (m,) ≥ 0 of the rows Gx ≥ low, both copies."""
 
     x: Array
     multipliers: Array
@@ -76,19 +76,19 @@ def solve_once(
 ) -> Optimum:
     """Solve min ½ xᵀPx + cᵀx subject to Ax = b, Gx ≥ low, x_l ≤ x ≤ x_u.
 
-    This is for a QP whose rows (m, n), possibly none, differ each time. Raises SolverError when PIQP does not
-    report SOLVED.
+    This is for a QP whose rows G (m, n), m ≥ 0, differ each time. The vectors are not validated. Raises
+    SolverError when PIQP does not report SOLVED.
     """
-    # 20 iterations are mostly enough; where there is hardly an interior it takes many.
-    solver = _quiet(250, 1e-8, (1e-9, 1e-9))
+    # 20 iterations are mostly enough; a QP with nearly no interior takes many more.
+    solver = _dense_solver(250, 1e-8, (1e-9, 1e-9))
     rows = (np.asfortranarray(G), low, np.full(len(low), np.inf)) if len(low) else (None, None, None)
     solver.setup(P, c, A, b, *rows, x_l, x_u)
     result = _solved(solver)
     return Optimum(np.array(result.x), np.array(result.z_l) if len(low) else np.zeros(0))
 
 
-def _quiet(max_iter: int, eps: float, gap: tuple[float, float]) -> Any:
-    """Return a dense solver with tolerances ``eps`` and, of the duality gap, ``gap`` (absolute, relative)."""
+def _dense_solver(max_iter: int, eps: float, gap: tuple[float, float]) -> Any:
+    """Return a dense solver with tolerance ``eps`` and, for the gap, ``gap`` (absolute, relative)."""
     solver = piqp.DenseSolver()
     settings = solver.settings
     settings.verbose = False

@@ -44,12 +44,17 @@ class CertifiedConfig(Settings):
     dt_us: WireStep = Field(200_000, description="knots of the plans, µs: absolute, k·dt")
     epoch_us: int = Field(200_000, gt=0, le=2_000_000, multiple_of=4, description="µs; a whole number of dt")
     last_call_us: int = Field(
-        20_000, ge=0, le=1_000_000, description="so long before the end of an epoch nothing is waited for"
+        20_000,
+        ge=0,
+        le=1_000_000,
+        description="µs before the end of an epoch from which the companion waits for no message",
     )
     repeat_us: int = Field(
-        50_000, gt=0, le=2_000_000, multiple_of=4, description="a plan is told again so often"
+        50_000, gt=0, le=2_000_000, multiple_of=4, description="µs between two transmissions of a plan"
     )
-    tube: Positive = Field(0.25, description="m, largest tracking error that the promise allows for")
+    tube: Positive = Field(
+        0.25, description="m, largest tracking error for which plans keep their separation"
+    )
     sigmas: float = Field(3.0, ge=0.0, le=6.0, description="k of k·σ of the position estimate")
     clock_us: int = Field(5_000, ge=0, le=100_000, description="µs that a clock may differ from fleet time")
     backup_hover_us: int = Field(
@@ -59,7 +64,7 @@ class CertifiedConfig(Settings):
         description="µs of hover at the end of a plan whose companion is gone",
     )
     fleet: tuple[int, ...] = Field(
-        (), max_length=255, description="system ids that take part: nobody moves before all are heard"
+        (), max_length=255, description="system ids that take part: no vehicle moves before all are received"
     )
     noncooperative_speed: Positive = Field(1.0, description="m/s, of those that share no plan")
     noncooperative_acceleration: Positive = Field(1.0, description="m/s², of those that share no plan")

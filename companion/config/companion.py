@@ -76,7 +76,7 @@ class CompanionConfig(Settings):
         "field", description="'field': the paper's; 'certified': committed plans between moving planes"
     )
     planar: bool = False
-    shares_plan: bool = Field(True, description="tell the others the horizon that is flown")
+    shares_plan: bool = Field(True, description="send the flown horizon to the others")
     neighbour_prediction: Literal["held", "velocity"] = Field(
         "held",
         description="without a shared horizon: the paper holds the n = 0 position; 'velocity' moves it on",
@@ -87,19 +87,17 @@ class CompanionConfig(Settings):
     target: TrackConfig = TrackConfig(
         sigma_position=1.0, sigma_velocity=0.3, sigma_acceleration=1.0, sigma_turn=0.5, jump=8.0
     )
-    target_source: TargetSource = Field(GlobalPositionSource(), description="what tells where the target is")
+    target_source: TargetSource = Field(GlobalPositionSource(), description="source of the target's position")
     target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
     target_d_safe: float | None = Field(None, gt=0.0, le=100.0)
-    obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed; the field is about them")
+    obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed obstacles")
     moving: tuple[Moving, ...] = Field(
-        (), max_length=100, description="who of those heard on the swarm link is an obstacle, and how large"
+        (), max_length=100, description="senders on the swarm link that are obstacles, and their sizes"
     )
     proximity: ProximityConfig | None = Field(
-        None, description="obstacles from OBSTACLE_DISTANCE; null: not listened to"
+        None, description="obstacles from OBSTACLE_DISTANCE; null: ignored"
     )
-    traffic: TrafficConfig | None = Field(
-        None, description="obstacles from ADSB_VEHICLE; null: not listened to"
-    )
+    traffic: TrafficConfig | None = Field(None, description="obstacles from ADSB_VEHICLE; null: ignored")
     horizon: HorizonConfig = HorizonConfig()
     cost: CostConfig = CostConfig()
     limits: LimitsConfig = LimitsConfig()
@@ -114,7 +112,7 @@ class CompanionConfig(Settings):
     approach_angle: ApproachAngleConfig = ApproachAngleConfig()
     surface: SurfaceConfig = Circle()
     surfaces: tuple[OwnSurface, ...] = Field(
-        (), max_length=255, description="of vehicles that have their own"
+        (), max_length=255, description="surfaces of vehicles with a surface of their own"
     )
     formation: FormationConfig = Field(
         Nearest(), description="how the vehicles share the surface: each its nearest point, or spread evenly"

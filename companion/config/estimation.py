@@ -26,9 +26,12 @@ class TrackConfig(Settings):
     )
     stamps: bool = Field(True, description="date by the sender's time_boot_ms; false: by the arrival alone")
     rewind_us: int = Field(
-        2_000_000, ge=0, le=10_000_000, description="how late a message may be and still be put in its place"
+        2_000_000,
+        ge=0,
+        le=10_000_000,
+        description="µs by which a message may be late and still be inserted at its time",
     )
-    extrapolate_us: Micros = Field(1_000_000, description="no track is carried further than this")
+    extrapolate_us: Micros = Field(1_000_000, description="µs: no track is extrapolated for longer")
     gate: Positive = Field(
         22.46, description="on d² = yᵀS⁻¹y, χ² of six: 16.81 passes 99 % of what is true, 22.46 99.9 %"
     )
@@ -36,6 +39,9 @@ class TrackConfig(Settings):
         3.0, description="m and m/s: an innovation beyond it is refused too; it grows by this per second"
     )
     witnesses: int = Field(
-        2, ge=1, le=10, description="refused measurements that agree with each other and are then believed"
+        2,
+        ge=1,
+        le=10,
+        description="number of refused measurements that are accepted if they agree with each other",
     )
     velocity_up: bool = Field(False, description="the sender's vz is positive up, contrary to MAVLink")

@@ -14,42 +14,58 @@ class GuardConfig(Settings):
     """Age limits (µs) of a plan's inputs, and limits beyond which the companion reacts."""
 
     own_stale_us: Micros = 500_000
-    hold_us: Micros = Field(500_000, description="a plan is held for so long after the last good one")
+    hold_us: Micros = Field(500_000, description="µs: a plan is held for this long after the last new one")
     target_stale_us: Micros = 3_000_000
     plan_stale_us: Micros = Field(500_000, description="a shared horizon older than this is not used")
     go_keeps_us: int = Field(
-        30_000_000, gt=0, le=600_000_000, description="a go that has not armed it by then is forgotten"
+        30_000_000,
+        gt=0,
+        le=600_000_000,
+        description="µs: a go that has not armed the vehicle by then is cancelled",
     )
     landing_speed: Positive = Field(0.3, description="m/s; slower than this a vehicle may land")
     landing_clearance: Positive = Field(1.0, description="m, horizontally to the nearest neighbour, to land")
-    settle_us: int = Field(30_000_000, ge=0, le=600_000_000, description="longest way from escort to landing")
+    settle_us: int = Field(
+        30_000_000, ge=0, le=600_000_000, description="µs: after this long the vehicle lands without settling"
+    )
     own_lost_us: int = Field(
-        5_000_000, gt=0, le=60_000_000, description="without own state for so long, it is told to land"
+        5_000_000, gt=0, le=60_000_000, description="µs without own state after which the vehicle lands"
     )
     unsolved_us: int = Field(
-        5_000_000, gt=0, le=60_000_000, description="without a plan for so long, it is told to land"
+        5_000_000, gt=0, le=60_000_000, description="µs without a plan after which the vehicle lands"
     )
     neighbour_lost_us: int = Field(
-        3_000_000, gt=0, le=600_000_000, description="said then, and kept away from"
+        3_000_000,
+        gt=0,
+        le=600_000_000,
+        description="µs: a neighbour silent for longer is a concern, and the vehicle flies cautiously",
     )
     flown_on_us: int = Field(
         0,
         ge=0,
         le=60_000_000,
         description="an autopilot may fly on for so long without its companion (GUID_TIMEOUT, "
-        "COM_OF_LOSS_T): a neighbour that falls silent may be anywhere on that way; 0: it is carried on "
-        "as any track is",
+        "COM_OF_LOSS_T): a neighbour that falls silent may be anywhere on that path; 0: its track is "
+        "extrapolated as usual",
     )
     cautious_speed: Positive | None = Field(
         None,
-        description="m/s, beside the target's: who misses deadlines, or hears a neighbour no more, flies "
-        "about so fast at most",
+        description="m/s in addition to the target's speed: limit for a vehicle that flies cautiously, as "
+        "after missed deadlines or without messages of a neighbour",
     )
-    late_us: Micros = Field(100_000, description="a step later than that is a missed deadline")
-    battery_low: float = Field(0.2, ge=0.0, le=1.0, description="share left: it comes back and lands")
-    battery_critical: float = Field(0.1, ge=0.0, le=1.0, description="share left: it lands")
-    fence_radius: float | None = Field(None, gt=0.0, description="m from the fleet origin: it comes back")
-    fence_height: float | None = Field(None, gt=0.0, description="m above the fleet origin: it comes back")
+    late_us: Micros = Field(100_000, description="µs: a step that is later is a missed deadline")
+    battery_low: float = Field(
+        0.2, ge=0.0, le=1.0, description="share left below which the vehicle returns and lands"
+    )
+    battery_critical: float = Field(
+        0.1, ge=0.0, le=1.0, description="share left below which the vehicle lands"
+    )
+    fence_radius: float | None = Field(
+        None, gt=0.0, description="m from the fleet origin, horizontally; beyond, the vehicle returns"
+    )
+    fence_height: float | None = Field(
+        None, gt=0.0, description="m above the fleet origin; beyond, the vehicle returns"
+    )
     displaced: Positive = Field(
         5.0, description="m by which the own place may change with the autopilot's origin; beyond, it lands"
     )
@@ -89,7 +105,7 @@ class RatesConfig(Settings):
 
 
 class TrackingConfig(Settings):
-    """Treatment of the difference between set-points and vehicle."""
+    """Compensation of drag and wind, and limits of the tracking error."""
 
     compensate: bool = Field(
         False, description="add to the set-point's acceleration what drag and wind take from the vehicle"
@@ -99,7 +115,7 @@ class TrackingConfig(Settings):
     most: float = Field(4.0, ge=0.0, le=10.0, description="m/s², of the compensation")
     usual: Positive | None = Field(
         None,
-        description="m: what the error has lately had beyond it, all keep further away; null: not told",
+        description="m: by its recent tracking error beyond this, all distances grow; null: they do not",
     )
     alarm: Positive | None = Field(
         None, description="m: a larger error is a concern, and the vehicle flies cautiously; null: none is"
@@ -114,8 +130,8 @@ class TrackingConfig(Settings):
 class GroundMessagesConfig(Settings):
     """Messages to the ground, and the links that carry them.
 
-    The autopilot's link is usually the narrowest, and whether the autopilot forwards what it receives depends
-    on its own settings: so it carries none unless configured.
+    The autopilot's link is usually the narrowest, and whether the autopilot forwards messages depends on its
+    own settings: so this link carries none unless configured.
     """
 
     texts: bool = Field(False, description="events as STATUSTEXT")

@@ -37,7 +37,7 @@ class HorizonConfig(Settings):
 class CostConfig(Settings):
     """Weights Ω_t and Ω_i, of which only the ratios matter.
 
-    The paper gives no values: these are settled by flying the swap and the escort.
+    The paper gives no values: these were determined in flights of the swap and the escort.
     """
 
     omega_t_position: Positive = 100.0
@@ -48,8 +48,8 @@ class CostConfig(Settings):
 class LimitsConfig(Settings):
     """Limits of plans.
 
-    ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it. The box is where vehicles may be: plans stay
-    inside by k·σ of the own position (``field.margin``).
+    ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it. The box is where vehicles may be: plans keep k·σ
+    of the own position (``field.margin``) from its sides.
     """
 
     u_max: Bounds = (2.0, 2.0, 2.0)
@@ -74,7 +74,7 @@ class LimitsConfig(Settings):
     def within(self, margin: float) -> LimitsConfig:
         """Return the limits with a box that is smaller by ``margin`` (m) on each side.
 
-        Where there is no room for that, the box is half as large.
+        On an axis with too little room each side moves by at most a quarter of the length.
         """
         sides = tuple(zip(self.box_min, self.box_max, strict=True))
         off = tuple(min(margin, (high - low) / 4.0) for low, high in sides)
@@ -183,18 +183,18 @@ class ApproachAngleConfig(Potential):
     d_safe: Positive = Field(1.0, description="rad²: the field begins there; (2π/8)² is 0.62")
     force_max: Positive = Field(4.0, description="m/s²; above u_max, or the input cancels it")
     pass_speed: Positive = Field(3.0, description="m/s across at which the force is gone; whole up to half")
-    reach: Positive = Field(6.0, description="m: who is further off is not met yet")
+    reach: Positive = Field(6.0, description="m: neighbours further away have no effect")
 
 
 class HeadingConfig(Settings):
-    """Limits of the yaw that is asked of the vehicle, and the weight of its effort."""
+    """Limits of the planned yaw, and the weight of its effort."""
 
     rate_max: Positive = Field(3.0, description="rad/s")
     acceleration_max: Positive = Field(
         1.6, description="rad/s²; the firefly's yaw torque gives 2.5 at hover, less while it turns hard"
     )
     effort: Positive = Field(1e-4, description="s⁴, weight of (yaw acceleration)² against (yaw error)²")
-    blind: Positive = Field(0.1, description="m, horizontally: nearer than this no bearing counts")
+    blind: Positive = Field(0.1, description="m, horizontally: bearings to a nearer target are not used")
 
 
 FADING = 1.0

@@ -1,8 +1,8 @@
 """Settings of the source of the target's position.
 
-Only one kind counts, so that two sources of the same target never pull one track to and fro. All kinds arrive
-on the target link, which may be a log; what the own vehicle's camera tracks arrives on the autopilot's link,
-too. All go through the same track, with its gates: ``CompanionConfig.target``.
+Only one kind is used, so that two sources do not move one track alternately. Messages of all kinds arrive on
+the target link, which may be a log; those of a camera also on the autopilot's link. All are filtered by the
+same track, with its gates: ``CompanionConfig.target``.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
 
 class _Sender(Settings):
     anyone: bool = Field(
-        False, description="whoever speaks first is the target, until silent; false: the chosen system alone"
+        False, description="the first sender is the target until it is silent; false: only the chosen system"
     )
 
 
@@ -47,7 +47,7 @@ class CameraSource(Settings):
 
 
 class FixedSource(Settings):
-    """Place that stays where it is, without messages."""
+    """Fixed position, without messages."""
 
     kind: Literal["fixed"]
     at: tuple[_Coordinate, _Coordinate, _Coordinate] = Field(description="m, fleet-local ENU")

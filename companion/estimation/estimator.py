@@ -3,8 +3,7 @@
 The state is [p, v] per axis; the model is constant velocity with white acceleration. A measurement is
 position and velocity, as in GLOBAL_POSITION_INT and LOCAL_POSITION_NED, or position alone, as FOLLOW_TARGET
 and cameras may send it. The three axes have the same model and the same noise, hence one gain and one
-covariance P (2, 2). Together they are exactly the filter of six states with covariance P ⊗ I₃
-(``kalman_gains``).
+covariance P (2, 2) (``kalman_gains``). Together they equal the filter of six states with covariance P ⊗ I₃.
 """
 
 from __future__ import annotations
@@ -26,18 +25,21 @@ Three = tuple[float, float, float]
 """Position (m) alone."""
 Measured = Six | Three
 
-_BLIND = 1e4
-"""m/s: σ of the velocity for a measurement without one, so large that it has no effect."""
-_ANY_SPEED = 5.0
-"""m/s: σ of the velocity of a sender that has reported positions, but never a velocity."""
-_DOUBTS = 4
-"""Maximum number of hypotheses beside the current state."""
-_STEPS = 2048
-"""Number of cached steps: one second's worth for two hundred senders."""
+_NO_VELOCITY_SIGMA = 1e4
+"""m/s: σ of the velocity for a measurement without velocity, so large that it has no effect."""
+_UNKNOWN_VELOCITY_SIGMA = 5.0
+"""m/s: σ of the velocity when a state starts or restarts at a measurement of position alone."""
+_MAX_HYPOTHESES = 4
+"""Maximum number of hypotheses that are kept beside the current state."""
+_CACHE_SIZE = 2048
+"""Number of cached filter steps: about one second of two hundred senders at 10 Hz."""
 
 
 class RefusedMeasurement(NamedTuple):
-    """The last of ``witnesses`` refused measurements that agree with each other, true at ``time`` (µs)."""
+    """Hypothesis: the last, ``z``, of ``witnesses`` refused measurements that agree, true at ``time`` (µs).
+
+    For a measurement of position alone, ``z`` has the velocity of the filter state.
+    """
 
     time: int
     z: Six
@@ -69,29 +71,30 @@ class Estimator:
     def __init__(self, config: TrackConfig) -> None:
         self._noise = Noise(config.sigma_position, config.sigma_velocity, config.sigma_acceleration)
         prepared(self._noise)
-        self._blind = self._noise._replace(velocity=_BLIND)
+        self._noise_no_velocity = self._noise._replace(velocity=_NO_VELOCITY_SIGMA)
         self._first: Square = (config.sigma_position**2, 0.0, 0.0, config.sigma_velocity**2)
-        self._first_blind: Square = (config.sigma_position**2, 0.0, 0.0, _ANY_SPEED**2)
+        self._first_no_velocity: Square = (config.sigma_position**2, 0.0, 0.0, _UNKNOWN_VELOCITY_SIGMA**2)
         self._turning = TurnFilter(config.sigma_turn, 1e-6 * config.turn_memory_us, config.sigma_velocity)
         self._gate = config.gate
         self._jump = config.jump
         self._witnesses = config.witnesses
-        self.after = lru_cache(maxsize=_STEPS)(self._after)
+        self.after = lru_cache(maxsize=_CACHE_SIZE)(self._after)
 
     def _after(self, belief: Belief | None, time: int, z: Measured) -> Belief:
         """Return the filter state after a measurement ``z`` that was true at ``time`` (µs).
 
         ``time`` is no earlier than the previous state's. The measurement is refused when d² = yᵀS⁻¹y exceeds
-        the gate (χ² of six), or when it lies further from the prediction than ``jump`` metres, or would do so
-        within a second, for every second since the last measurement plus one. Refused measurements agree when
-        each lies within that distance of the extrapolation of the one before it: after ``witnesses`` of them
-        the state restarts at the last one. They need not fit the motion model; otherwise a sender that
-        manoeuvres harder than the model assumes would be locked out.
+        the gate (χ² of six), or when the innovation of the position (m) or of the velocity (m/s) exceeds
+        ``jump`` · (1 + seconds since the last accepted measurement). Two refused measurements agree when the
+        position of the later one lies within ``jump`` · (1 + seconds between them), in m, of the
+        extrapolation of the earlier one. After ``witnesses`` that agree in succession the state restarts at
+        the last one. They need not fit the motion model; otherwise a sender that manoeuvres harder than the
+        model assumes would be locked out.
 
-        A measurement of position alone gives no turn rate: velocities derived from positions lag behind.
+        A measurement of position alone resets the turn rate: velocities derived from positions lag behind.
         """
         if len(z) == 3:
-            return self._after_place(belief, time, z)
+            return self._after_position(belief, time, z)
         if belief is None:
             return Belief(time, z, self._first, self._turning.prior, (), 0)
         elapsed = time - belief.time
@@ -101,10 +104,14 @@ class Estimator:
         a, b, c, d, e, f = belief.x
         a, b, c = a + dt * d, b + dt * e, c + dt * f
         ya, yb, yc, yd, ye, yf = z[0] - a, z[1] - b, z[2] - c, z[3] - d, z[4] - e, z[5] - f
-        far, fast = ya * ya + yb * yb + yc * yc, yd * yd + ye * ye + yf * yf
-        distance = u * far - 2.0 * t * (ya * yd + yb * ye + yc * yf) + s * fast
-        if max(far, fast) > self._most(elapsed) ** 2 or distance > self._gate * (s * u - t * t):
-            return self._doubt(belief, time, z, self._first)
+        squared_offset, squared_velocity_offset = ya * ya + yb * yb + yc * yc, yd * yd + ye * ye + yf * yf
+        d2_times_det = (
+            u * squared_offset - 2.0 * t * (ya * yd + yb * ye + yc * yf) + s * squared_velocity_offset
+        )
+        if max(squared_offset, squared_velocity_offset) > self._largest_innovation(
+            elapsed
+        ) ** 2 or d2_times_det > self._gate * (s * u - t * t):
+            return self._refuse_or_restart(belief, time, z, self._first)
         x = (
             a + j * ya + k * yd,
             b + j * yb + k * ye,
@@ -116,41 +123,45 @@ class Estimator:
         turn = self._turning.updated(belief.turn, dt, (d, e), (x[3], x[4]))
         return Belief(time, x, P, turn, (), belief.refused)
 
-    def _after_place(self, belief: Belief | None, time: int, z: Three) -> Belief:
+    def _after_position(self, belief: Belief | None, time: int, z: Three) -> Belief:
         """Update with a position alone.
 
         The innovation of the velocity is 0 and its measurement noise is very large.
         """
         if belief is None:
-            return Belief(time, (*z, 0.0, 0.0, 0.0), self._first_blind, self._turning.prior, (), 0)
+            return Belief(time, (*z, 0.0, 0.0, 0.0), self._first_no_velocity, self._turning.prior, (), 0)
         elapsed = time - belief.time
-        (s, t, u), (j, _, m, _), P = gain(self._blind, belief.P, elapsed)
+        (s, t, u), (j, _, m, _), P = gain(self._noise_no_velocity, belief.P, elapsed)
         dt = 1e-6 * elapsed
         a, b, c, d, e, f = belief.x
         a, b, c = a + dt * d, b + dt * e, c + dt * f
         ya, yb, yc = z[0] - a, z[1] - b, z[2] - c
-        far = ya * ya + yb * yb + yc * yc
-        if far > self._most(elapsed) ** 2 or u * far > self._gate * (s * u - t * t):
-            return self._doubt(belief, time, (*z, d, e, f), self._first_blind)
+        squared_offset = ya * ya + yb * yb + yc * yc
+        if squared_offset > self._largest_innovation(elapsed) ** 2 or u * squared_offset > self._gate * (
+            s * u - t * t
+        ):
+            return self._refuse_or_restart(belief, time, (*z, d, e, f), self._first_no_velocity)
         x = (a + j * ya, b + j * yb, c + j * yc, d + m * ya, e + m * yb, f + m * yc)
         return Belief(time, x, P, self._turning.prior, (), belief.refused)
 
-    def _doubt(self, belief: Belief, time: int, z: Six, first: Square) -> Belief:
+    def _refuse_or_restart(self, belief: Belief, time: int, z: Six, first: Square) -> Belief:
+        """Refuse ``z``, or restart at it, with covariance ``first``, if enough refused measurements agree."""
         doubts = list(belief.doubts)
         witnesses = 1
-        for index, (since, x, agreeing) in enumerate(doubts):
+        for index, (since, x, witnesses) in enumerate(doubts):
             dt = 1e-6 * (time - since)
             off = (z[axis] - x[axis] - dt * x[axis + 3] for axis in range(3))
-            if sum(part * part for part in off) <= self._most(time - since) ** 2:
-                witnesses = agreeing + 1
+            if sum(part * part for part in off) <= self._largest_innovation(time - since) ** 2:
+                witnesses = witnesses + 1
                 del doubts[index]
                 break
         if witnesses >= self._witnesses:
             return Belief(time, z, first, self._turning.prior, (), belief.refused)
         doubts.append(RefusedMeasurement(time, z, witnesses))
-        return belief._replace(doubts=tuple(doubts[-_DOUBTS:]), refused=belief.refused + 1)
+        return belief._replace(doubts=tuple(doubts[-_MAX_HYPOTHESES:]), refused=belief.refused + 1)
 
-    def _most(self, elapsed: int) -> float:
+    def _largest_innovation(self, elapsed: int) -> float:
+        """Return the largest accepted innovation (m and m/s) after ``elapsed`` µs."""
         return self._jump * (1.0 + 1e-6 * elapsed)
 
 

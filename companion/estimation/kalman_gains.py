@@ -1,8 +1,8 @@
 """filterpy's Kalman filter of one axis: covariance after a step, and gain.
 
-Neither depends on the measured values, so they recur. For a sender with a constant rate they converge to one
-gain within a few seconds; a sender that loses messages now and then passes through the same few gains again.
-Therefore they are cached.
+Both depend on the noise and the intervals, not on the measured values. They converge within a few seconds for
+a sender with a constant rate; after a lost message the same few values occur again. Therefore they are
+cached.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ def model(elapsed: int, sigma: float) -> tuple[Array, Array]:
 def prepared(noise: Noise) -> Any:
     """Return the configured filter.
 
-    The first call loads filterpy, so time-critical callers call this beforehand.
+    It is shared by all callers with the same ``noise``. The first call loads filterpy, which takes time:
+    call this before time-critical work begins.
     """
     # filterpy also imports scipy.stats, which takes longer than the rest of a companion's start.
     from filterpy.kalman import KalmanFilter
@@ -80,7 +81,7 @@ def prepared(noise: Noise) -> Any:
 
 
 def _inverse(S: Array) -> Array:
-    """Invert a (2, 2) matrix in closed form: numpy's inverse is optimised for larger ones."""
+    """Invert a (2, 2) matrix in closed form, which is faster than numpy's general inverse."""
     (a, b), (c, d) = S.tolist()
     scale = 1.0 / (a * d - b * c)
     return np.array([[d * scale, -b * scale], [-c * scale, a * scale]])

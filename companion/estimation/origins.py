@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from mavlink_bridge.messages import GpsGlobalOrigin
 
-_OVERTAKEN = 2_000_000
-"""µs; messages do not overtake each other by more.
+_MAX_OVERTAKING_US = 2_000_000
+"""Longest time by which messages overtake each other.
 
-An autopilot that reboots, and restarts its clock, needs longer than this until it has a position.
+An autopilot that reboots, and thereby restarts its clock, takes longer than this to find a position.
 """
 
 
@@ -18,11 +18,13 @@ class Origins:
         self._time = self._received = 0
 
     def counts(self, now: int, origin: GpsGlobalOrigin) -> bool:
-        """Return whether ``origin``, received at ``now`` (µs), is not an older one, late or resent.
+        """Return whether ``origin``, received at ``now`` (µs), is to be used.
 
-        An older one must be rejected, because no later message would restore the newer one.
+        It is not to be used if its time stamp is earlier than that of the last used origin and this one was
+        received at most 2 s before: it is then late or resent, and no later message would restore the newer
+        origin. An origin without a time stamp (0) is always used.
         """
-        if 0 < origin.time < self._time and now - self._received <= _OVERTAKEN:
+        if 0 < origin.time < self._time and now - self._received <= _MAX_OVERTAKING_US:
             return False
         self._time, self._received = origin.time, now
         return True

@@ -1,8 +1,8 @@
 """Out-of-sequence buffer: the last seconds of a track, so that late measurements are inserted in order.
 
-Measurements are sorted by the times at which they were true, each with the filter state after it. A late one
-is inserted, and those after it are processed again, gate and hypotheses included: the result is bit-identical
-to the result of an arrival in order.
+Measurements are sorted by the times at which they were true, each with the filter state after it. A late
+measurement is inserted, and all later ones are processed again, gate and hypotheses included: the result is
+bit-identical to the result of an arrival in order.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from companion.estimation.sender_clock import TrackTime
 
 
 class OutOfSequenceBuffer:
-    """Measurements of at least the last ``window`` µs, and the filter state before them.
+    """Measurements of at least the last ``window`` µs, at most twice that, and the filter state before them.
 
-    Some older measurements are kept for a while, too.
+    ``belief``: latest filter state, None before the first measurement; ``too_late``: number of measurements
+    refused because they were from before the window.
     """
 
     __slots__ = (
@@ -43,8 +44,8 @@ class OutOfSequenceBuffer:
     def put(self, dated: TrackTime, z: Measured) -> bool:
         """Add a measurement ``z``; return whether it became part of the filter state.
 
-        A measurement from before the window is refused and counted. If several have the same stamp the first
-        counts, and the others get the first one's answer.
+        A measurement from before the window is refused and counted. A measurement with the same sender's
+        stamp as an earlier one is a duplicate: it is ignored, and the answer is that of the earlier one.
         """
         times = self._times
         time = dated.time
@@ -52,18 +53,18 @@ class OutOfSequenceBuffer:
             if time < times[-1] - self._window:
                 self.too_late += 1
                 return False
-            return self._between(dated, z)
+            return self._insert(dated, z)
         before = self.belief
         self.belief = belief = self._estimator.after(before, time, z)
         times.append(time)
         self._measured.append(z)
         self._beliefs.append(belief)
-        # Removed in batches: keeping some longer than the window does no harm, because they are never used.
+        # Removed in batches; measurements from before the window are never processed again.
         if times[0] < time - 2 * self._window:
             self._forget()
         return before is None or belief.refused == before.refused
 
-    def _between(self, dated: TrackTime, z: Measured) -> bool:
+    def _insert(self, dated: TrackTime, z: Measured) -> bool:
         """Insert a late measurement; return whether it became part of the filter state."""
         times, time = self._times, dated.time
         place = bisect_right(times, time)
@@ -85,11 +86,12 @@ class OutOfSequenceBuffer:
         self.belief = belief
 
     def _accepted(self, place: int) -> bool:
+        """Return whether the gate accepted the measurement at index ``place``."""
         before = self._beliefs[place - 1] if place > 0 else self._before
         return before is None or self._beliefs[place].refused == before.refused
 
     def _forget(self) -> None:
-        """Remove measurements from before the window: no late one is inserted between them."""
+        """Remove measurements from before the window: none is inserted between them any more."""
         old = bisect_left(self._times, self._times[-1] - self._window)
         self._before = self._beliefs[old - 1]
         del self._times[:old], self._measured[:old], self._beliefs[:old]

@@ -3,34 +3,38 @@
 A plan carries its epoch in Unix time. Usually both clocks are set by GPS or over the network, and a
 millisecond matters little. A wrong clock, however, shifts every plan away from its sender's true position,
 and a single plan does not show that the clock is wrong. So the clock is estimated from all plans, as the
-tracks' clocks are: the error of the estimate is the time by which the fastest plan exceeded the configured
-least delay, which is small after some plans, and the positions of the same sender are dated alike. An epoch
-near the estimate is used as sent, since it is more accurate; any other is replaced by the estimate.
+tracks' clocks are (``SenderClock``). The estimate is late by the time by which the fastest plan exceeded the
+configured least delay, which is small after some plans. An epoch near the estimate is used as sent, since it
+is more accurate; any other epoch is replaced by the estimate after enough plans.
 """
 
 from __future__ import annotations
 
 from companion.estimation.sender_clock import SenderClock
 
-_NEAR = 50_000
-"""µs; tolerated difference between epoch and estimate.
+_EPOCH_TOLERANCE_US = 50_000
+"""Tolerated difference between epoch and estimate.
 
 It covers two clocks that are off by some milliseconds, and a link that is slower than configured by a few
-periods. At 5 m/s it is a quarter of a metre, half of d_min.
+periods. At 5 m/s it corresponds to 0.25 m.
 """
-_ENOUGH = 3
-"""Number of consistent plans before an impossible epoch is replaced by the estimate."""
-_MANY = 10
+_MIN_PLANS = 3
+"""Number of consistent plans before an epoch is replaced by the estimate.
+
+With fewer, the beginning of a plan with an impossible epoch (in the future, or too old) is unknown.
+"""
+_MIN_PLANS_POSSIBLE_EPOCH = 10
 """Number of plans before a possible epoch is replaced by the estimate.
 
-With a jitter of 100 ms, the probability that none of ten is faster than ``_NEAR`` is one in a thousand.
+With a uniform jitter of 0…100 ms, the probability is 0.001 that all ten are later than
+``_EPOCH_TOLERANCE_US``.
 """
 
 
 class PlanClock:
     """The clock of one sender of plans; all times in µs.
 
-    ``delay``: the least age of a message at its arrival; ``stale``: how old a plan may be.
+    ``delay``: the least age of a message at its arrival; ``stale``: largest age of a possible epoch.
     """
 
     __slots__ = (
@@ -58,19 +62,22 @@ class PlanClock:
     def begins(self, now: int, epoch: int, dt: int) -> int | None:
         """Return when a plan with ``epoch`` and steps of ``dt``, received at ``now``, begins.
 
-        Returns None while that cannot be determined. A plan that its sender keeps, and sends again, keeps its
-        beginning.
+        ``epoch`` is on the sender's clock, the result on the own one. Returns None while the beginning cannot
+        be determined. A plan that is sent again, with the same epoch, keeps its result.
         """
         if epoch != self._epoch:
-            self._epoch, self._begins = epoch, self._first(now, epoch, dt)
+            self._epoch, self._begins = epoch, self._begins_first(now, epoch, dt)
         return self._begins
 
-    def _first(self, now: int, epoch: int, dt: int) -> int | None:
+    def _begins_first(self, now: int, epoch: int, dt: int) -> int | None:
+        """Return when a plan begins that is received for the first time."""
         dated = self._clock.date(now, epoch)
         if dated is None or not dated.stamped:
             return None
         estimate = dated.time + self._clock.skew
         possible = now - self._stale <= epoch <= now + dt
-        if abs(estimate - epoch) <= _NEAR or (possible and self._clock.support < _MANY):
+        if abs(estimate - epoch) <= _EPOCH_TOLERANCE_US or (
+            possible and self._clock.support < _MIN_PLANS_POSSIBLE_EPOCH
+        ):
             return epoch
-        return estimate if self._clock.support >= _ENOUGH else None
+        return estimate if self._clock.support >= _MIN_PLANS else None

@@ -34,7 +34,7 @@ class Target:
         self._system = system
         number = message_of(source)
         self._kind = None if number is None else BY_ID[number].message
-        self._believed = sender_of(source, system, target_system)
+        self._accepted_system = sender_of(source, system, target_system)
         self._links = ("target", "autopilot") if isinstance(source, CameraSource) else ("target",)
         self._fixed = None
         if isinstance(source, FixedSource):
@@ -57,15 +57,15 @@ class Target:
         return True
 
     def at(self, now: int) -> State | None:
-        """Return the target's state at ``now`` (µs); None before the first message and when it is stale."""
+        """Return the target's state at ``now`` (µs); None before the first measurement and when stale."""
         return self.fresh(self.last(now))
 
     def last(self, now: int) -> State | None:
         """Return the last known state at ``now`` (µs), however old: extrapolated for a bounded time.
 
-        The target may well still be there. Returns None before the first message.
+        A target that falls silent may still be there. Returns None before the first measurement.
         """
-        return self._known.at(now) if self._fixed is None else self._fixed
+        return self._known_track.at(now) if self._fixed is None else self._fixed
 
     def fresh(self, state: State | None) -> State | None:
         """Return ``state``, or None if it is older than ``guard.target_stale_us``."""
@@ -76,23 +76,25 @@ class Target:
         """Return the age (µs) of the last measurement: None before the first, 0 for a fixed target."""
         if self._fixed is not None:
             return 0
-        time = self._known.time
+        time = self._known_track.time
         return None if time is None else now - time
 
     @property
-    def _known(self) -> Track:
+    def _known_track(self) -> Track:
         """Track of the current sender, or of the previous one until the current one's has a state."""
         return self._before if self._track.time is None else self._track
 
     def _accepts(self, now: int, source: Source) -> bool:
         """Return whether messages of ``source`` are accepted at ``now`` (µs).
 
-        Two components of one system may both report a target, each with its own clock and errors. The one
-        received first is kept until it has been silent for ``guard.target_stale_us``.
+        Two components of one system may both report a target, each with its own clock and errors. The source
+        received first is kept until none of its messages has entered the track for ``guard.target_stale_us``.
         """
-        if source.system == 0 or (self._believed is not None and source.system != self._believed):
+        if source.system == 0 or (
+            self._accepted_system is not None and source.system != self._accepted_system
+        ):
             return False
-        if self._believed is None and source.system == self._system:
+        if self._accepted_system is None and source.system == self._system:
             return False
         if source == self._sender:
             return True
@@ -100,18 +102,19 @@ class Target:
             if now - self._received <= self._config.guard.target_stale_us:
                 return False
             # The new sender has another clock and other errors.
-            self._before, self._track = self._known, Track(self._config.target)
+            self._before, self._track = self._known_track, Track(self._config.target)
         self._sender, self._received = source, now
         return True
 
     def _measure(self, now: int, message: Message) -> bool:
+        """Add the measurement in ``message`` to the track; return whether it was accepted."""
         velocity: Array | None
         if isinstance(message, GlobalPosition):
             velocity, stamp = ned_to_enu(message.velocity_ned), message.time_boot
         elif isinstance(message, FollowTarget):
-            # Three zeros also stand for an unknown velocity.
-            told = message.velocity if message.velocity is not None and any(message.velocity) else None
-            velocity, stamp = None if told is None else ned_to_enu(told), message.time_boot
+            # In FOLLOW_TARGET three zeros also stand for an unknown velocity.
+            reported = message.velocity if message.velocity is not None and any(message.velocity) else None
+            velocity, stamp = None if reported is None else ned_to_enu(reported), message.time_boot
         elif (
             isinstance(message, CameraTrackingGeo)
             and message.status == mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE

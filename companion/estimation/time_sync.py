@@ -1,9 +1,9 @@
 """Round-trip measurement of the autopilot's clock by TIMESYNC (111) when its messages seem late.
 
-Messages with growing delay indicate either a slow link or a slow clock; one-way delays cannot tell which. A
-request and its response can: the autopilot's clock showed the returned time after the request was sent. So
-its offset is known to within the time that the request took, regardless of how long the response took
-(``SenderClock.answered``). No requests are sent while messages arrive as expected.
+Messages with growing delay indicate either a slow link or a slow clock; one-way messages cannot distinguish
+the two. A request and its response can: the autopilot's clock showed the returned time after the request was
+sent. So its offset is known to within the time that the request took, regardless of how long the response
+took (``SenderClock.answered``). No requests are sent while messages arrive as expected.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from typing import NamedTuple
 
 from mavlink_bridge.messages import Source, Timesync
 
-_NS = 1000
-"""ns per µs.
+_NS_PER_US = 1000
+"""Nanoseconds per microsecond.
 
-The last three digits of a request's time are its sender's component id, so that responses can be assigned.
+The last three digits of a request's time (ns) are its sender's component id: they identify its response.
 """
-_LATE = 20_000
-"""Delay (µs) of the fastest of the last few messages above which requests are sent."""
-_PERIOD = 200_000
-"""µs between two requests."""
-_OPEN = 32
-"""Maximum number of open requests."""
-_PATIENCE = 3_000_000
-"""µs of requests without a response, after which none is expected any more."""
+_LATE_US = 20_000
+"""Requests are sent if even the fastest of the last few messages has a larger delay."""
+_PERIOD_US = 200_000
+"""Time between two requests."""
+_MAX_OPEN_REQUESTS = 32
+"""Maximum number of requests whose response is awaited."""
+_RESPONSE_TIMEOUT_US = 3_000_000
+"""Time for which requests may remain without a response before ``unanswered`` reports it."""
 
 
 class Answer(NamedTuple):
@@ -41,19 +41,19 @@ class RoundTrips:
     def __init__(self, own: Source) -> None:
         self._own = own
         self._next = 0
-        self._asked: deque[int] = deque(maxlen=_OPEN)
+        self._asked: deque[int] = deque(maxlen=_MAX_OPEN_REQUESTS)
         self._since: int | None = None
 
     def due(self, now: int, late: int) -> list[Timesync]:
-        """Return the request that is due at ``now`` (µs), if any; ``late``: delay (µs) of the messages."""
-        if late <= _LATE:
+        """Return the request due at ``now`` (µs), if any; ``late``: delay (µs) of the messages."""
+        if late <= _LATE_US:
             self._since = None
             return []
         if now < self._next:
             return []
-        self._next = now + _PERIOD
+        self._next = now + _PERIOD_US
         self._since = now if self._since is None else self._since
-        question = now * _NS + self._own.component
+        question = now * _NS_PER_US + self._own.component
         self._asked.append(question)
         return [Timesync(self._own, 0, question)]
 
@@ -63,8 +63,8 @@ class RoundTrips:
             return None
         self._asked.remove(message.ts1)
         self._since = None
-        return Answer(message.ts1 // _NS, message.tc1 // _NS)
+        return Answer(message.ts1 // _NS_PER_US, message.tc1 // _NS_PER_US)
 
     def unanswered(self, now: int) -> bool:
-        """Return whether messages are late and the requests have had no response for ``_PATIENCE``."""
-        return self._since is not None and now - self._since > _PATIENCE
+        """Return whether requests are being sent and have had no response for ``_RESPONSE_TIMEOUT_US``."""
+        return self._since is not None and now - self._since > _RESPONSE_TIMEOUT_US

@@ -19,8 +19,8 @@ from companion.estimation.sender_clock import SenderClock
 from companion.estimation.turn_rate import Path, turning_path
 from companion.values.horizon import Array
 
-_FAR, _FAST = 1e5, 100.0
-"""m and m/s; a state beyond either limit is rejected as garbage, even if its frame was valid."""
+_MAX_DISTANCE_M, _MAX_SPEED_M_S = 1e5, 100.0
+"""A measurement beyond either limit is rejected as implausible."""
 
 
 class State(NamedTuple):
@@ -46,9 +46,9 @@ class Track:
     """Filter of the measurements of one sender; times are the companion's own, in µs."""
 
     __slots__ = (
-        "_absurd",
         "_clock",
         "_config",
+        "_implausible",
         "_rewind",
         "_undated",
     )
@@ -57,7 +57,7 @@ class Track:
         self._config = config
         self._clock = SenderClock(config.delay_us, config.rewind_us)
         self._rewind = OutOfSequenceBuffer(estimator(config), config.rewind_us)
-        self._absurd = self._undated = 0
+        self._implausible = self._undated = 0
 
     @property
     def brief(self) -> bool:
@@ -79,7 +79,7 @@ class Track:
         """Number of discarded measurements: implausible, not datable, too late, or refused by the gate."""
         belief = self._rewind.belief
         refused = 0 if belief is None else belief.refused
-        return self._absurd + self._undated + self._rewind.too_late + refused
+        return self._implausible + self._undated + self._rewind.too_late + refused
 
     @property
     def refused(self) -> int:
@@ -95,7 +95,7 @@ class Track:
 
     @property
     def clock_steps(self) -> int:
-        """Number of times that the sender's clock was re-synchronised after the first synchronisation."""
+        """Number of times that the sender's clock was synchronised again after the first time."""
         return max(0, self._clock.laid - 1)
 
     def measure(self, received: int, position: Array, velocity: Array | None, stamp: int = 0) -> bool:
@@ -103,15 +103,15 @@ class Track:
 
         ``stamp`` is the sender's clock (µs) at sending, 0 for none. Position (3,) m and velocity (3,) m/s or
         None are fleet-local ENU as in the message: for senders with a reversed vertical speed
-        (``velocity_up``) the sign is corrected here. A late measurement is inserted at its place in time if
-        ``rewind_us`` reaches back that far. A duplicate changes nothing.
+        (``velocity_up``) the sign is corrected here. A measurement that is at most ``rewind_us`` older than
+        the latest is inserted in time order. A duplicate with a stamp does not change the state.
         """
         return self.take(received, measured(position, velocity, upward=self._config.velocity_up), stamp)
 
     def take(self, received: int, z: Measured | None, stamp: int) -> bool:
         """Add a measurement that ``measured`` has converted; return whether it was accepted."""
         if z is None:
-            self._absurd += 1
+            self._implausible += 1
             return False
         dated = self._clock.date(received, stamp if self._config.stamps else 0)
         if dated is None:
@@ -121,9 +121,9 @@ class Track:
 
     @property
     def late(self) -> int:
-        """Delay (µs) of the fastest of the last few messages beyond the expected one.
+        """Delay (µs) of the fastest of the last few messages beyond what clock and link explain.
 
-        The cause is a slow link or a slow clock.
+        The cause is a link that became slow or a clock that stood still.
         """
         return self._clock.late
 
@@ -141,23 +141,24 @@ class Track:
             self._clock.answered(received, asked, stamp)
 
     def when(self, received: int, stamp: int) -> int:
-        """Return when another message of the same sender was true, µs.
+        """Return when the content of another message of the same sender was true, µs.
 
-        The message arrived at ``received`` and was sent with ``stamp``, both µs.
+        The message arrived at ``received`` (own clock) with ``stamp`` (sender's clock, 0 for none), both µs.
         """
         return self._clock.reads(received, stamp if self._config.stamps else 0)
 
     def at(self, now: int) -> State | None:
         """Return the state extrapolated to ``now`` (µs), or None before the first measurement.
 
-        Extrapolation ends after ``extrapolate_us``; from then on the state stays there at rest.
+        Extrapolation ends after ``extrapolate_us``; from then on the state stays there at rest. Before the
+        last accepted measurement the result is the state at this measurement, with a negative age.
         """
         belief = self._rewind.belief
         if belief is None:
             return None
         age = now - self._clock.skew - belief.time
-        most = self._config.extrapolate_us
-        dt = 1e-6 * min(max(age, 0), most)
+        longest = self._config.extrapolate_us
+        dt = 1e-6 * min(max(age, 0), longest)
         a, b, c, d, e, f = belief.x
         rate, sigma = belief.turn.rate, self._sigma(belief, age)
         if rate == 0.0:
@@ -165,24 +166,24 @@ class Track:
         else:
             path = turning_path(np.array((a, b, c)), np.array((d, e, f)), rate, np.array((dt,)))
             position, velocity = path.positions[0], path.velocities[0]
-        if age > most:
+        if age > longest:
             return State(position, np.zeros(3), age, sigma)
         return State(position, velocity, age, sigma, rate)
 
     @property
     def last(self) -> Six:
-        """Position (m) and velocity (m/s) at the last accepted measurement.
+        """Filtered position (m) and velocity (m/s) at the last accepted measurement.
 
         Raises ValueError before the first.
         """
-        return self._known().x
+        return self._known_belief().x
 
     def covariance(self, now: int | None = None) -> Array:
-        """Return the covariance (6, 6) of position and velocity at ``now`` (µs), or at the last measurement.
+        """Return the covariance (6, 6) of position and velocity at ``now`` (µs).
 
-        Raises ValueError before the first measurement.
+        Without ``now`` it is that of the last accepted measurement. Raises ValueError before the first one.
         """
-        belief = self._known()
+        belief = self._known_belief()
         P = np.array(belief.P).reshape(2, 2)
         age = 0 if now is None else now - self._clock.skew - belief.time
         if age > 0:
@@ -191,12 +192,13 @@ class Track:
         return np.asarray(np.kron(P, np.eye(3)), dtype=np.float64)
 
     def _sigma(self, belief: Belief, age: int) -> float:
+        """Return σ (m) of the position on each axis, ``age`` µs after the state."""
         p, c, _, v = belief.P
         dt = 1e-6 * max(age, 0)
         grown = self._config.sigma_acceleration**2 * dt**3 / 3.0
         return math.sqrt(p + dt * (2.0 * c + dt * v) + grown)
 
-    def _known(self) -> Belief:
+    def _known_belief(self) -> Belief:
         if self._rewind.belief is None:
             raise ValueError("nothing has been heard yet: there is no state")
         return self._rewind.belief
@@ -210,8 +212,8 @@ def measured(position: Array, velocity: Array | None, *, upward: bool) -> Measur
     """
     a, b, c = position.tolist()
     if velocity is None:
-        return (a, b, c) if a * a + b * b + c * c <= _FAR**2 else None
+        return (a, b, c) if a * a + b * b + c * c <= _MAX_DISTANCE_M**2 else None
     d, e, f = velocity.tolist()
-    if not (a * a + b * b + c * c <= _FAR**2 and d * d + e * e + f * f <= _FAST**2):
+    if not (a * a + b * b + c * c <= _MAX_DISTANCE_M**2 and d * d + e * e + f * f <= _MAX_SPEED_M_S**2):
         return None
     return a, b, c, d, e, -f if upward else f

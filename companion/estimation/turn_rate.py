@@ -2,8 +2,9 @@
 
 A target that runs round a bend at 4 m/s and 0.33 rad/s is 1.6 m beside the straight line at the end of a
 horizon of 1.6 s. The rate is a first-order Gauss–Markov process (Singer's model, applied to the turn rate
-instead of the acceleration). So the estimate decays without new measurements. Where the velocity is mostly
-noise the filter's gain is nearly zero and the predicted motion is straight, as without the filter.
+instead of the acceleration), so the estimate decays where measurements carry no information. Where the
+velocity is mostly noise the filter's gain is nearly zero and the predicted motion is straight, as without the
+filter.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ import numpy as np
 
 from companion.values.horizon import Array
 
-_NEAR = 1e-3
-"""m; a displacement below this has no defined course."""
+_MIN_DISPLACEMENT_M = 1e-3
+"""Horizontal displacement below which the course is undefined."""
 
 
 class Turn(NamedTuple):
@@ -27,7 +28,7 @@ class Turn(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Positions (n, 3) m and velocities (n, 3) m/s, fleet-local ENU; the latter may be read-only."""
+    """Positions (n, 3) m and velocities (n, 3) m/s, fleet-local ENU; ``velocities`` may be read-only."""
 
     positions: Array
     velocities: Array
@@ -48,14 +49,14 @@ class TurnFilter:
         """Return the estimate ``dt`` seconds later.
 
         ``before`` and ``now``: the horizontal velocity (m/s) before and after. ``turn`` is returned unchanged
-        if ``sigma`` is 0 or ``dt`` is not positive; below 1 mm of displacement it is only predicted.
+        if ``sigma`` is 0 or ``dt`` is not positive; below 1 mm of displacement the estimate only decays.
         """
         if self._variance == 0.0 or dt <= 0.0:
             return turn
         decay = exp(-dt / self._memory)
         rate, variance = decay * turn.rate, decay**2 * turn.variance + (1.0 - decay**2) * self._variance
         speed = min(hypot(*before), hypot(*now))
-        if speed * dt < _NEAR:
+        if speed * dt < _MIN_DISPLACEMENT_M:
             return Turn(rate, variance)
         measured = remainder(atan2(now[1], now[0]) - atan2(before[1], before[0]), tau) / dt
         gain = variance / (variance + 2.0 * self._noise / (speed * dt) ** 2)
@@ -65,7 +66,7 @@ class TurnFilter:
 def turning_path(position: Array, velocity: Array, rate: float, seconds: Array) -> Path:
     """Return the path from ``position`` (3,), m, at ``velocity`` (3,), m/s, after each of ``seconds`` (n,).
 
-    The course turns at ``rate`` (rad/s); speed and vertical speed stay constant.
+    The course turns at ``rate`` (rad/s, counter-clockwise); horizontal and vertical speed stay constant.
     """
     if rate == 0.0:
         straight = position + np.multiply.outer(seconds, velocity)

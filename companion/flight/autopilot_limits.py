@@ -21,14 +21,14 @@ from mavlink_bridge.messages import Message, ParamRequestRead, ParamValue, Sourc
 from mavlink_bridge.wire.param_value import number_of
 
 UNREAD = "the autopilot's parameters"
-"""Value of ``waiting`` until the parameters have been received or the time for it is over."""
-_REMARKS = 16
+"""Value of ``waiting`` until all parameters have been received or ``PATIENCE`` is over."""
+_MAX_REMARKS = 16
 PATIENCE = 5_000_000
-"""µs from the first request after which unanswered parameters count as stock."""
-_RETRY = 500_000
+"""µs from the first request after which stock values are used for unanswered parameters."""
+_RETRY_US = 500_000
 """µs between two requests for unanswered parameters."""
-_AGAIN = 10_000_000
-"""µs between two requests for all parameters once settled: a parameter may be changed before the go."""
+_REFRESH_US = 10_000_000
+"""µs between two requests for all parameters once settled: they may be changed before the go."""
 
 
 class Parameters:
@@ -47,7 +47,7 @@ class Parameters:
         self._since = None
 
     def receive(self, message: ParamValue, profile: Profile) -> None:
-        """Receive a value, whether the companion requested it or not."""
+        """Receive a value, requested or not; ignore other parameters and values that are not finite."""
         if message.name in stock_parameters(profile.autopilot):
             value = number_of(message, bytewise=profile.bytewise)
             if value is not None:
@@ -58,16 +58,16 @@ class Parameters:
         return tuple(name for name in stock_parameters(profile.autopilot) if name not in self._values)
 
     def settled(self, now: int, profile: Profile) -> bool:
-        """Return whether all parameters are received at ``now`` (µs), or the time for it is over."""
+        """Return whether all parameters are received at ``now`` (µs), or ``PATIENCE`` is over."""
         late = self._since is not None and now - self._since >= PATIENCE
         return late or not self.unread(profile)
 
     def requests(self, now: int, profile: Profile) -> list[Message]:
-        """Return requests for missing parameters; once settled, for all of them from time to time."""
+        """Return requests for missing parameters every 0.5 s; once settled, for all of them every 10 s."""
         settled = self.settled(now, profile)
         if self._since is None:
             self._since = now
-        elif now - self._asked < (_AGAIN if settled else _RETRY):
+        elif now - self._asked < (_REFRESH_US if settled else _RETRY_US):
             return []
         self._asked = now
         names = stock_parameters(profile.autopilot) if settled else self.unread(profile)
@@ -78,9 +78,10 @@ class Parameters:
 class AutopilotLimits:
     """Limits of the autopilot of one ``vehicle``.
 
-    Without ``limits_from_autopilot`` nothing is requested and all limits are as configured. ``lowered``
-    changes only in ``step``, which is not called in flight. ``remarks``: the last texts to report; ``said``:
-    number of all of them. ``unread``: the parameters that were not answered in time.
+    Without ``limits_from_autopilot``, or with another avoidance than ``field``, nothing is requested and all
+    limits are as configured. ``lowered`` changes only in ``step``, which is called only before the take-off
+    or take-over. ``remarks``: the last texts to report; ``said``: number of texts so far. ``unread``: the
+    parameters for which stock values are used.
     """
 
     def __init__(self, config: CompanionConfig, vehicle: Vehicle, own: Source) -> None:
@@ -89,7 +90,7 @@ class AutopilotLimits:
         self._vehicle = vehicle
         self._parameters = Parameters(own)
         self.lowered = Lowered(config.limits)
-        self.remarks: deque[str] = deque(maxlen=_REMARKS)
+        self.remarks: deque[str] = deque(maxlen=_MAX_REMARKS)
         self.said = 0
         self.unread: tuple[str, ...] = ()
         self._found: dict[str, float] | None = None
@@ -107,7 +108,7 @@ class AutopilotLimits:
 
     @property
     def waiting(self) -> str:
-        """Reason why a go is not accepted yet, or is impossible; empty if there is none."""
+        """Reason why a start is not possible yet, or not at all; empty if there is none."""
         if not self._on:
             return ""
         return UNREAD if self._found is None else self.lowered.lacking
@@ -120,7 +121,7 @@ class AutopilotLimits:
     def step(self, now: int) -> list[Message]:
         """Return the requests to send at ``now`` (µs).
 
-        If the autopilot is silent all is forgotten, because it may return with other parameters.
+        If the autopilot is silent all parameters are forgotten, because it may return with others.
         """
         profile = self._vehicle.profile
         if not self._on or profile is None:
@@ -136,7 +137,7 @@ class AutopilotLimits:
         return requests
 
     def _remark(self, before: Lowered, unread: tuple[str, ...]) -> None:
-        """Report what has changed."""
+        """Report the differences from ``before``, and the parameters that are newly ``unread``."""
         if unread and unread != self.unread:
             which = ", ".join(unread) if len(self._found or ()) else "any parameter"
             self._say(f"Autopilot does not tell {which}: stock values assumed")

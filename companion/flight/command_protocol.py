@@ -8,11 +8,12 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import CommandAck, CommandLong, Message, Source
 
-_RETRY = 500_000
-_EXPIRY = 15_000_000
-"""µs after which an acknowledged command without effect is sent again; longer than a take-off."""
+_RETRY_US = 500_000
+"""µs between two transmissions of an unacknowledged command."""
+_EXPIRY_US = 15_000_000
+"""µs after which ``call`` sends an acknowledged command again; longer than a take-off."""
 
-_REFUSALS = 16
+_MAX_REFUSALS = 16
 
 _Call = tuple[int, tuple[float, ...]]
 
@@ -20,14 +21,14 @@ _Call = tuple[int, tuple[float, ...]]
 class Commands:
     """Commands sent to the autopilot of ``own``'s system, and its answers.
 
-    ``refusals``: descriptions of the last refusals.
+    ``refusals``: descriptions of the last refusals, at most 16.
     """
 
     def __init__(self, own: Source) -> None:
         self.own = self._own = own
-        self.refusals: deque[str] = deque(maxlen=_REFUSALS)
+        self.refusals: deque[str] = deque(maxlen=_MAX_REFUSALS)
         self.refused = 0
-        """Number of refusals; a repeated one counts once."""
+        """Number of refusals; a repetition of a command's last result is not counted."""
         self._results: dict[_Call, int] = {}
         self._acknowledged: set[_Call] = set()
         self._answered: set[_Call] = set()
@@ -37,8 +38,8 @@ class Commands:
     def receive(self, message: CommandAck) -> None:
         """Receive an acknowledgement, unless it is addressed to another component.
 
-        It contains the command id alone and is assigned to the last command with this id. MAVLink 1 does not
-        contain the addressee.
+        COMMAND_ACK contains the command id alone and is assigned to the last command sent with this id. In
+        MAVLink 1 it has no addressee (0).
         """
         own = self._own
         if message.target_system not in (0, own.system) or message.target_component not in (0, own.component):
@@ -78,13 +79,13 @@ class Commands:
     def call(self, now: int, command: int, params: tuple[float, ...]) -> list[Message]:
         """Return the command to send at ``now`` (µs), or an empty list.
 
-        It is not sent if it was acknowledged, was sent less than half a second ago, or must wait for its
-        turn: COMMAND_ACK contains the command id alone, so only one command with the same id may be open at a
-        time.
+        It is not sent if it was acknowledged in the last 15 s, was sent less than half a second ago, or must
+        wait for its turn: COMMAND_ACK contains the command id alone, so only one command with the same id may
+        be open at a time.
         """
         key = _key(command, params)
-        if key in self._acknowledged and now - self._sent.get(key, now) > _EXPIRY:
-            # Acknowledged but without effect: send it again.
+        if key in self._acknowledged and now - self._sent.get(key, now) > _EXPIRY_US:
+            # The caller still wants the command: it had no effect, and is sent again.
             self._acknowledged.discard(key)
         if key in self._acknowledged or self._recent(now, key) or self._recent(now, self._asked.get(command)):
             return []
@@ -94,9 +95,9 @@ class Commands:
         return [CommandLong(self._own, *target, command, 0, (p1, p2, p3, p4, p5, p6, p7))]
 
     def _recent(self, now: int, call: _Call | None) -> bool:
-        return call is not None and now - self._sent.get(call, -_RETRY) < _RETRY
+        return call is not None and now - self._sent.get(call, -_RETRY_US) < _RETRY_US
 
 
 def _key(command: int, params: tuple[float, ...]) -> _Call:
-    # NaN does not equal itself.
+    # NaN parameters are left out, because NaN does not equal itself.
     return command, tuple(p for p in params if p == p)

@@ -12,16 +12,16 @@ from enum import Enum
 
 from companion.flight.vehicle import Vehicle
 
-_GAP = 500_000
-"""µs between set-points: PX4's shortest useful time-out, COM_OF_LOSS_T."""
-_BLAME = 2_000_000
-"""µs after a gap during which a loss of the mode is attributed to it."""
-_PATIENCE = 6_000_000
-"""µs for which the mode is requested again."""
+_MAX_GAP_US = 500_000
+"""µs between set-points beyond which PX4's time-out (COM_OF_LOSS_T) may have ended the mode."""
+_GAP_EFFECT_US = 2_000_000
+"""µs after a gap during which a loss of the mode is attributed to the gap."""
+_RECOVERY_TIMEOUT_US = 6_000_000
+"""µs from the loss of the mode during which the mode is requested again."""
 
 
 class Owner(Enum):
-    """Owner of the vehicle."""
+    """Owner of the vehicle; ``LOST``: a time-out ended the guided mode, and nobody controls the vehicle."""
 
     OURS = "ours"
     LOST = "lost by accident"
@@ -42,12 +42,12 @@ class ControlAuthority:
         self._lost_at: int | None = None
 
     def begin(self) -> None:
-        """Start with the companion as owner."""
+        """Begin an escort: forget earlier set-points and losses."""
         self._streamed = self._gap_ended = self._lost_at = None
 
     def streamed(self, now: int) -> None:
-        """Record that a set-point is sent at ``now`` (µs)."""
-        if self._streamed is not None and now - self._streamed > _GAP:
+        """Record that a set-point is sent at ``now`` (µs), and detect a gap before it."""
+        if self._streamed is not None and now - self._streamed > _MAX_GAP_US:
             self._gap_ended = now
         self._streamed = now
 
@@ -64,7 +64,7 @@ class ControlAuthority:
             return Owner.TAKEN
         if self._lost_at is None:
             self._lost_at = now
-        return Owner.LOST if now - self._lost_at <= _PATIENCE else Owner.TAKEN
+        return Owner.LOST if now - self._lost_at <= _RECOVERY_TIMEOUT_US else Owner.TAKEN
 
     def _is_accident(self, now: int) -> bool:
         beat, profile = self._vehicle.heartbeat, self._vehicle.profile
@@ -72,12 +72,12 @@ class ControlAuthority:
             return False
         if self._lost_at is not None:
             return True
-        missing = self._streamed is not None and now - self._streamed > _GAP
-        return missing or (self._gap_ended is not None and now - self._gap_ended <= _BLAME)
+        missing = self._streamed is not None and now - self._streamed > _MAX_GAP_US
+        return missing or (self._gap_ended is not None and now - self._gap_ended <= _GAP_EFFECT_US)
 
 
 class Passage:
-    """Checks that the modes during take-off or landing result from the companion's own orders.
+    """Checks that the modes during take-off or landing result from the companion's own order.
 
     Any other mode was set by another controller. ``first``: custom_mode of HEARTBEAT at the time of the
     order, which the vehicle keeps until the order takes effect.
@@ -91,8 +91,8 @@ class Passage:
     def strays(self, mode: int, ways: frozenset[int], before: frozenset[int] = frozenset()) -> bool:
         """Return whether ``mode`` does not result from the own order.
 
-        The modes in ``ways`` do; until one of these has been seen, the first mode and those in ``before`` do,
-        too.
+        Modes in ``ways`` result from it. Until one of these has been seen, the first mode and those in
+        ``before`` are permitted, too.
         """
         if mode in ways:
             self.entered = True

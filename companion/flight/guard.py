@@ -1,6 +1,6 @@
 """Fallback when planning fails: the old plan for a bounded time, then a brake to a hover.
 
-No plan is kept indefinitely.
+No plan is held for longer than ``guard.hold_us``.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Horizon, Motion, roll_out
 
-_STEP = 0.2
-"""m: largest displacement of a set-point in one step."""
-_BESIDE = 0.3
-"""m: usual deviation of autopilots from their set-points."""
+_MAX_SHIFT = 0.2
+"""m: largest shift of the plan's start towards the vehicle in one plan."""
+_USUAL_ERROR = 0.3
+"""m: usual deviation of autopilots from their set-points; it is not blended out."""
 
 
 class Holding(Enum):
-    """What the vehicle flies at present."""
+    """Kind of the horizon that is flown."""
 
     FRESH = "fresh plan"
     HELD = "held plan"
@@ -31,8 +31,8 @@ class Holding(Enum):
 class Guard:
     """Owner of the horizon that is flown.
 
-    ``held``: number of replans that kept the old horizon; ``failures``: those of them that were caused by the
-    solver.
+    ``held``: number of replans without a new plan; ``failures``: those caused by the solver.
+    ``anchored_anew``: number of plans begun outside the tube (with ``guard.blend``: of exits from the tube).
     """
 
     def __init__(self, config: CompanionConfig) -> None:
@@ -46,14 +46,14 @@ class Guard:
         self._lost = False
         self._anchored_at = 0
         self.failing: int | None = None
-        """Time (µs) since which the solver finds no plan; None while it does."""
+        """Time (µs) since which the solver finds no plan; None while it finds plans."""
 
     def keep(self, limits: LimitsConfig) -> None:
         """Use these ``limits`` for braking from now on."""
         self._config = self._config.model_copy(update={"limits": limits})
 
     def start(self, now: int, motion: Motion) -> None:
-        """Start at this state at ``now`` (µs): brake to a hover there until the first plan."""
+        """Start at the state ``motion`` at ``now`` (µs): brake from it to a hover until the first plan."""
         self.failing = None
         self.horizon = brake(now, motion, self._config)
         self._fresh_at = now
@@ -71,9 +71,9 @@ class Guard:
         self.state = Holding.FRESH
 
     def hold(self, now: int, *, solver: bool) -> None:
-        """Keep the old plan while it is young enough, then brake from its state at ``now`` (µs).
+        """Keep the old plan for ``guard.hold_us``, then brake from its state at ``now`` (µs).
 
-        ``solver``: whether the solver is the reason that there is no new plan.
+        ``solver``: whether a failure of the solver is the reason.
         """
         self.held += 1
         self.failures += solver
@@ -86,35 +86,34 @@ class Guard:
             self.horizon = brake(now, self.horizon.at(now), self._config)
             self.state = Holding.BRAKING
 
-    def anchor(self, now: int, position: Motion) -> Motion:
-        """Return the state to plan from.
+    def anchor(self, now: int, measured: Motion) -> Motion:
+        """Return the state at ``now`` (µs) to plan from: the flown horizon's, or the ``measured`` one.
 
-        It is the flown horizon's, unless the vehicle is outside the tube around it.
-
-        Planning from the plan keeps the set-point continuous and lets the autopilot reject wind; outside the
-        tube the plan restarts at the measured state. With ``guard.blend`` the state is moved continuously
-        towards the vehicle, so slowly that no set-point jumps; outside the tube faster, but no step is longer
-        than 0.2 m.
+        Planning from the flown horizon keeps the set-point continuous and lets the autopilot reject wind. The
+        measured state is returned without a horizon, and outside the tube around it. With ``guard.blend`` the
+        horizon's state is instead moved towards the vehicle: inside the tube at that rate and only by what
+        exceeds 0.3 m, outside the tube by up to 0.2 m per plan.
         """
         last, self._anchored_at = self._anchored_at, now
         if self.horizon is None:
-            return position
+            return measured
         reference = self.horizon.at(now)
-        off = position.position - reference.position
+        off = measured.position - reference.position
         size = float(np.sqrt(off @ off))
         lost, self._lost = self._lost, size > self._config.guard.tube
         blend = self._config.guard.blend
         if blend is None:
             self.anchored_anew += self._lost
-            return position if self._lost else reference
+            return measured if self._lost else reference
         self.anchored_anew += self._lost and not lost
         if self._lost:
-            share = min(_STEP / size, 1.0)
+            share = min(_MAX_SHIFT / size, 1.0)
         else:
-            share = min(blend * max(size - _BESIDE, 0.0) * (now - last) * 1e-6, _STEP) / max(size, _BESIDE)
+            shift = min(blend * max(size - _USUAL_ERROR, 0.0) * (now - last) * 1e-6, _MAX_SHIFT)
+            share = shift / max(size, _USUAL_ERROR)
         return Motion(
             reference.position + share * off,
-            reference.velocity + share * (position.velocity - reference.velocity),
+            reference.velocity + share * (measured.velocity - reference.velocity),
             reference.acceleration,
         )
 
@@ -123,8 +122,8 @@ def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
     """Return a horizon that brakes in a straight line to rest within the horizon's length, then hovers.
 
     It has N + 1 segments. The deceleration is the smallest of u_max, or more where that does not suffice.
-    Where even a_total does not stop the vehicle in time the steps get longer, because a brake has as many
-    steps as a plan.
+    Where even a_total does not stop the vehicle in time, the steps are made longer, because a brake has as
+    many steps as a plan.
     """
     n, limits = config.horizon.steps + 1, config.limits
     speed = float(np.sqrt(motion.velocity @ motion.velocity))

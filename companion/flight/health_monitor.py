@@ -1,7 +1,7 @@
 """Health monitor: detects what is wrong and for how long, and defines the reaction.
 
-Each concern has a limit, an age or a share, in ``GuardConfig``; a reaction, which is undone only by an order
-and never by the end of the concern; and a text for the ground, sent when it begins and when it ends.
+Each concern has a condition, usually a limit in ``GuardConfig``; a reaction, which is undone only by an order
+and never by the end of the concern; and a text for the ground, sent when the concern begins and when it ends.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Reaction(Enum):
 
 
 class Concern(NamedTuple):
-    """A present fault."""
+    """A present fault; ``name`` identifies it, ``text`` describes it to the ground."""
 
     name: str
     text: str
@@ -44,10 +44,10 @@ class HealthInputs(NamedTuple):
     ``late``: µs from the last step's due time to this step; ``neighbours``: age (µs) by system id;
     ``holding``: what is flown; ``failing``: since when (µs) no plan could be solved, None while plans are
     found; ``clock_steps``: how often the autopilot's clock has been set; ``moves``: how often the autopilot's
-    origin has moved, the last time shifting the vehicle by ``displaced`` m; ``clock_lost``: µs that its clock
-    has lost in total; ``unanswered``: the autopilot's messages are late, and it does not answer whether its
-    clock is the reason; ``error``: distance (m) of the vehicle from its set-points; ``nearest``: system id
-    and distance (m) of the nearest neighbour.
+    origin has moved, the last time shifting the vehicle by ``displaced`` m; ``clock_lost``: µs that the
+    autopilot's clock has lost in total; ``unanswered``: the autopilot's messages are late, and it does not
+    answer whether its clock is the reason; ``error``: distance (m) of the vehicle from its set-points;
+    ``nearest``: system id and distance (m) of the nearest neighbour.
     """
 
     now: int
@@ -74,8 +74,8 @@ class Change(NamedTuple):
     begins: bool
 
 
-class _Lately:
-    """Extends a momentary event into a concern of ``_REMEMBERED`` µs."""
+class _ExtendedEvent:
+    """Extends a momentary event into a concern of ``_EVENT_DURATION_US`` µs."""
 
     def __init__(self) -> None:
         self._until = 0
@@ -83,18 +83,18 @@ class _Lately:
     def after(self, now: int, happens: bool) -> bool:
         """Return whether the event happens now or happened recently."""
         if happens:
-            self._until = now + _REMEMBERED
+            self._until = now + _EVENT_DURATION_US
         return now < self._until
 
 
 class HealthMonitor:
-    """Determines the concerns in each situation; ``concerns`` are the present ones, by name."""
+    """Determines the concerns from the inputs; ``concerns``: the present ones, by name."""
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
         self.concerns: dict[str, Concern] = {}
-        self._late, self._clock_set, self._origin_moved = _Lately(), _Lately(), _Lately()
-        self._astray = _Lately()
+        self._late, self._clock_set, self._origin_moved = _ExtendedEvent(), _ExtendedEvent(), _ExtendedEvent()
+        self._off_setpoints = _ExtendedEvent()
         self._clock_steps = self._moves = 0
         self._lost: deque[tuple[int, int]] = deque()
         self._target_seen = False
@@ -109,14 +109,14 @@ class HealthMonitor:
 
     @property
     def blinkered(self) -> bool:
-        """Whether a concern about neighbours, position, tracking or missed deadlines calls for caution.
+        """Whether a concern about neighbours, positioning, tracking or missed deadlines is present.
 
-        Information on the others or on the own position may then be old, or the vehicle reacts late.
+        Information on the others or on the own position may then be old or wrong, or the vehicle reacts late.
         """
-        vague = not _VAGUE.isdisjoint(self.concerns)
-        return vague or any(name.startswith((_NEIGHBOUR, _CLOSE)) for name in self.concerns)
+        vague = not _CAUTION_CONCERNS.isdisjoint(self.concerns)
+        return vague or any(name.startswith((_NEIGHBOUR_PREFIX, _NEAR_PREFIX)) for name in self.concerns)
 
-    # Each of the following returns a concern, or None.
+    # ``_judge`` collects the concerns; most of the following methods return one, or None.
 
     def _judge(self, s: HealthInputs) -> list[Concern]:
         found = [
@@ -189,7 +189,7 @@ class HealthMonitor:
             return Concern(
                 "custody", "Vehicle taken over: no set-points until a go", severity=Severity.NOTICE
             )
-        # The higher states also mean a failsafe.
+        # MAV_STATE_EMERGENCY and higher states also mean a failsafe.
         if beat.system_status >= mavlink.MAV_STATE_CRITICAL:
             return Concern("failsafe", "Autopilot reports a failsafe")
         return None
@@ -200,7 +200,7 @@ class HealthMonitor:
             return None
         return (
             Concern("tracking", "Vehicle is beside its set-points: slower")
-            if self._astray.after(s.now, s.error > alarm)
+            if self._off_setpoints.after(s.now, s.error > alarm)
             else None
         )
 
@@ -232,13 +232,16 @@ class HealthMonitor:
         return Concern("clock", "The autopilot's clock has jumped") if jumped else None
 
     def _slow_clock(self, s: HealthInputs) -> Concern | None:
-        """Return a concern if the clock loses time over some seconds; a single loss is only a stall."""
+        """Return a concern if the autopilot's clock loses more than 1 % of 10 s.
+
+        A present concern ends when the loss is 0.25 % or less.
+        """
         lost = self._lost
         lost.append((s.now, s.clock_lost))
-        while s.now - lost[0][0] > _LOSING:
+        while s.now - lost[0][0] > _CLOCK_PERIOD_US:
             lost.popleft()
-        most = _SLOW if "slow clock" not in self.concerns else 0.25 * _SLOW
-        if s.clock_lost - lost[0][1] <= most * _LOSING or s.phase in _ON_THE_GROUND:
+        most = _MAX_LOST_SHARE if "slow clock" not in self.concerns else 0.25 * _MAX_LOST_SHARE
+        if s.clock_lost - lost[0][1] <= most * _CLOCK_PERIOD_US or s.phase in _ON_THE_GROUND:
             return None
         return Concern("slow clock", "Autopilot's clock is slow: followed")
 
@@ -261,13 +264,15 @@ class HealthMonitor:
     def _others(self, s: HealthInputs) -> list[Concern]:
         limit = self._config.guard.neighbour_lost_us
         lost = sorted(system for system, age in s.neighbours.items() if age > limit)
-        return [Concern(f"{_NEIGHBOUR}{system}", f"Neighbour {system} is not heard") for system in lost]
+        return [
+            Concern(f"{_NEIGHBOUR_PREFIX}{system}", f"Neighbour {system} is not heard") for system in lost
+        ]
 
 
-_NEIGHBOUR, _CLOSE = "neighbour ", "near "
-_VAGUE = frozenset(("lateness", "positioning", "tracking"))
+_NEIGHBOUR_PREFIX, _NEAR_PREFIX = "neighbour ", "near "
+_CAUTION_CONCERNS = frozenset(("lateness", "positioning", "tracking"))
 _ON_THE_GROUND = (Phase.CONNECT, Phase.DONE)
-_REMEMBERED = 5_000_000
+_EVENT_DURATION_US = 5_000_000
 """µs for which a momentary event remains a concern."""
-_SLOW, _LOSING = 0.01, 10_000_000
-"""Share of the time that a clock loses above which it is slow, and the period (µs) of the measurement."""
+_MAX_LOST_SHARE, _CLOCK_PERIOD_US = 0.01, 10_000_000
+"""Lost share of the time above which a clock is slow, and the period (µs) over which it is measured."""

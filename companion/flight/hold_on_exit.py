@@ -2,9 +2,9 @@
 
 An autopilot that has received positions and velocities continues along them until its time-out. So the
 process that detects the end of a companion requests the mode in which the autopilot holds its position by
-itself; but only if the companion's set-points steered last: another controller keeps the vehicle. The result
-follows from the autopilot's heartbeat: an acknowledgement may be for another sender, or for a mode that did
-not last.
+itself; but only if the companion's set-points steered last: otherwise another controller has the vehicle. The
+result follows from the autopilot's heartbeat: an acknowledgement may be for another sender, or for a mode
+that did not last.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 
-_AGAIN, _GRANTED = 100_000, 1_500_000
-"""µs between two requests, and after an accepted one: by then the heartbeat has reported it."""
-_PATIENCE = 3_000_000
-"""µs until the attempt is given up."""
+_RETRY_US, _ACCEPTED_RETRY_US = 100_000, 1_500_000
+"""µs until the next request, normally and after an accepted one: a heartbeat reports the mode within that."""
+_TIMEOUT_US = 3_000_000
+"""µs from the first step until the attempt is given up."""
 _RECEIVED = frozenset((mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_COMMAND_ACK))
 
 
 class HoldOnExit:
-    """A ``Node`` with one link, ``autopilot``; times are wall-clock µs.
+    """``Node`` with one link, ``autopilot``, that requests the hold mode; times are wall-clock µs.
 
     ``heartbeat``: the last that the companion received, None for none; ``steered``: whether the companion
-    controlled the vehicle. ``over``: nothing more is to be done; ``said``: the result; ``failed``: the
+    controlled the vehicle. ``said``: the result, empty until ``over``; ``failed``: the
     vehicle may continue along the last set-points.
     """
 
@@ -69,34 +69,34 @@ class HoldOnExit:
 
     @property
     def over(self) -> bool:
-        """Whether the attempt is over: the vehicle holds, is controlled by another, or does not answer."""
+        """Whether the attempt is over: hold mode, disarmed, another controller, or no success in 3 s."""
         return bool(self.said)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Request the mode until the autopilot is in it, for at most three seconds."""
+        """Return the request for the hold mode while it is needed, for at most three seconds."""
         if self._signing is not None:
             self._signing.present(now)
         if self._until is None:
-            self._until = now + _PATIENCE
+            self._until = now + _TIMEOUT_US
         for datagram in inbox:
             for message in self._codec.feed(datagram.data, whole=True):
                 if not isinstance(message, CommandAck):
                     self._vehicle.receive(message)
                     self._fresh = True
                 elif self._asked and _grants(message):
-                    self._next = now + _GRANTED
+                    self._next = now + _ACCEPTED_RETRY_US
         if not self.over:
             self.said = self._verdict(late=now >= self._until)
         if self.over or not self._steered or now < self._next:
             return []
-        self._next, self._asked = now + _AGAIN, True
+        self._next, self._asked = now + _RETRY_US, True
         hold = self._profile.hold_call
         target = self._own.system, mavlink.MAV_COMP_ID_AUTOPILOT1
         order = CommandLong(self._own, *target, mavlink.MAV_CMD_DO_SET_MODE, 0, hold)
         return [Datagram("autopilot", self._codec.encode(order))]
 
     def _verdict(self, *, late: bool) -> str:
-        """Return the result, or an empty string while it is not known.
+        """Return the result, or an empty string while it is not known; ``late``: the time is over.
 
         The companion's last heartbeat may be outdated, so a newer one is awaited.
         """

@@ -1,4 +1,4 @@
-"""Landing position of a vehicle, compared with its starting position if it was to return."""
+"""Landing position of a vehicle, compared with its starting position."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Landing(NamedTuple):
     """A completed landing.
 
     ``returning``: the vehicle was returning to its start. ``off``: upper bound (m) of its horizontal distance
-    from the return position, as measured on the ground; None if it was not measured.
+    from the return position, by the estimate on the ground; None without a start or a fresh own state.
     """
 
     returning: bool
@@ -26,9 +26,9 @@ class Landing(NamedTuple):
 def landed(
     config: CompanionConfig, start: Array | None, own: State | None, doubt: float, *, returning: bool
 ) -> Landing:
-    """Return the landing of a vehicle that started at ``start`` (3,), fleet-local ENU.
+    """Return the landing of a vehicle that started at ``start`` (3,), m, fleet-local ENU.
 
-    ``own``: its state on the ground, uncertain by ``doubt`` (m).
+    ``own``: its state on the ground; ``doubt``: uncertainty (m) of its position.
     """
     if start is None or own is None or own.age > config.guard.own_stale_us:
         return Landing(returning, None)

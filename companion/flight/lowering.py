@@ -2,7 +2,7 @@
 
 A set-point beyond the firmware's limits is followed late: the vehicle is then not where its plan says, and
 the separation of the plans is of no use. Jerk bounds apply where the firmware enforces them on set-points
-(``Limits.shaped``). A bound on a norm is divided between the two horizontal axes.
+(``Limits.shaped``). The bounds on the horizontal norms of jerk and speed are divided between the two axes.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from companion.config.planning import LimitsConfig
 from companion.flight.autopilots import Loop, Profile, Shaping
 from companion.flight.autopilots.limits import STOCK, Limits, deciding, limits_of
 
-_AXIS = 0.7
-"""Share of a norm that each axis may use when both use the same."""
-_TILT = 0.9
-"""Share of the acceleration at the largest tilt for plan and compensation; the rest is for gusts."""
-_ALIKE = 1e-3
-"""Relative difference below which a lower limit counts as equal: float32 is slightly inexact."""
+_AXIS_SHARE = 0.7
+"""Share of the bound on a horizontal norm that each of the two axes may use, about 1/√2."""
+_TILT_SHARE = 0.9
+"""Share of the acceleration at the largest tilt that plan and compensation may use; the rest is for gusts."""
+_TOLERANCE = 1e-3
+"""Relative difference up to which a lower limit counts as equal: parameters are float32."""
 
-_JERK, _ACCELERATION, _TILT_DEG = 1.0, 1.0, 10.0
+_MIN_JERK, _MIN_ACCELERATION, _MIN_TILT_DEG = 1.0, 1.0, 10.0
 """The least values with which an escort is flown: m/s³, m/s² and degrees.
 
 With 1 m/s³ a vehicle needs 1.9 m to stop from a walker's 1.5 m/s, and 6.6 m from 3.5 m/s.
 """
-_SPEED, _VERTICAL, _POSITION_GAIN, _VELOCITY_GAIN = 1.0, 0.3, 0.3, 0.5
+_MIN_SPEED, _MIN_VERTICAL_SPEED, _MIN_POSITION_GAIN, _MIN_VELOCITY_GAIN = 1.0, 0.3, 0.3, 0.5
 """The least values with which an escort is flown: m/s, m/s up and down, 1/s and 1/s.
 
 With lower gains a position error lasts for more than three seconds, and a velocity error for more than two.
@@ -35,11 +35,12 @@ With lower gains a position error lasts for more than three seconds, and a veloc
 
 
 class Lowered(NamedTuple):
-    """Result of lowering.
+    """Result of ``lowered``.
 
     ``limits``: limits for plans. ``acceleration`` (m/s²): bound on the sum of plan and compensation,
-    horizontal. ``loop``: the autopilot's gains, None for the stock firmware's. ``changes``: descriptions of
-    what was lowered; ``lacking``: description of what is too low for any escort, empty if nothing is.
+    horizontal. ``loop``: the autopilot's gains, None where the stock firmware's are to be used. ``changes``:
+    descriptions of what was lowered; ``lacking``: description of what is too low for any escort, empty if
+    nothing is.
     """
 
     limits: LimitsConfig
@@ -58,7 +59,7 @@ def lowered(limits: LimitsConfig, profile: Profile, parameters: Mapping[str, flo
     lacking = "; ".join(_lacking(able, profile.autopilot, parameters))
     if lacking:
         return Lowered(limits, lacking=lacking)
-    room = _TILT * able.tilt_acceleration
+    room = _TILT_SHARE * able.tilt_acceleration
     a_total = min(limits.a_total, room)
     u = min(able.acceleration, a_total)
     speed = min(1.0, able.speed / hypot(*limits.v_max[:2]))
@@ -86,12 +87,12 @@ def lowered(limits: LimitsConfig, profile: Profile, parameters: Mapping[str, flo
 def _jerk(limits: LimitsConfig, able: Limits) -> tuple[float, float, float] | None:
     if not able.shaped:
         return limits.j_max
-    x, y, z = limits.j_max or (inf, inf, _AXIS * able.jerk)
-    return min(x, _AXIS * able.jerk), min(y, _AXIS * able.jerk), z
+    x, y, z = limits.j_max or (inf, inf, _AXIS_SHARE * able.jerk)
+    return min(x, _AXIS_SHARE * able.jerk), min(y, _AXIS_SHARE * able.jerk), z
 
 
 def _loop(profile: Profile, able: Limits) -> Loop:
-    """Return the loop gains with these parameters; ArduPilot's trajectory gains follow from its limits."""
+    """Return the loop gains for the limits ``able``, from which those of ArduPilot's trajectory follow."""
     loop = profile.loop._replace(position=able.position_gain, velocity=able.velocity_gain)
     if not able.shaped:
         return loop
@@ -101,7 +102,7 @@ def _loop(profile: Profile, able: Limits) -> Loop:
 
 
 def _changes(before: LimitsConfig, after: LimitsConfig, able: Limits) -> Iterator[tuple[str, str]]:
-    """Yield what is lower in ``after``, and the field of ``able`` that is the reason."""
+    """Yield a text for each limit that is lower in ``after``, and the responsible field of ``able``."""
     push = "acceleration" if able.acceleration < after.a_total else "tilt"
     climb = "climb" if able.climb < able.sink else "sink"
     jerks = before.j_max or (inf, inf, inf), after.j_max or (inf, inf, inf)
@@ -113,21 +114,21 @@ def _changes(before: LimitsConfig, after: LimitsConfig, able: Limits) -> Iterato
         ("v_max", "m/s", max(before.v_max[:2]), max(after.v_max[:2]), "speed"),
         ("v_max up", "m/s", before.v_max[2], after.v_max[2], climb),
     ):
-        if is_now < (1.0 - _ALIKE) * was:
+        if is_now < (1.0 - _TOLERANCE) * was:
             yield f"{name} {is_now:.3g} {unit}", limit
 
 
 def _lacking(able: Limits, autopilot: int, parameters: Mapping[str, float]) -> Iterator[str]:
     for what, unit, limit, is_now, least in (
-        ("jerk", "m/s³", "jerk", able.jerk if able.shaped else inf, _JERK),
-        ("horizontal acceleration", "m/s²", "acceleration", able.acceleration, _ACCELERATION),
-        ("tilt", "°", "tilt", degrees(able.tilt), _TILT_DEG),
-        ("speed", "m/s", "speed", able.speed, _SPEED),
-        ("rate of climb", "m/s", "climb", able.climb, _VERTICAL),
-        ("rate of descent", "m/s", "sink", able.sink, _VERTICAL),
-        ("position gain", "1/s", "position_gain", able.position_gain, _POSITION_GAIN),
-        ("velocity gain", "1/s", "velocity_gain", able.velocity_gain, _VELOCITY_GAIN),
+        ("jerk", "m/s³", "jerk", able.jerk if able.shaped else inf, _MIN_JERK),
+        ("horizontal acceleration", "m/s²", "acceleration", able.acceleration, _MIN_ACCELERATION),
+        ("tilt", "°", "tilt", degrees(able.tilt), _MIN_TILT_DEG),
+        ("speed", "m/s", "speed", able.speed, _MIN_SPEED),
+        ("rate of climb", "m/s", "climb", able.climb, _MIN_VERTICAL_SPEED),
+        ("rate of descent", "m/s", "sink", able.sink, _MIN_VERTICAL_SPEED),
+        ("position gain", "1/s", "position_gain", able.position_gain, _MIN_POSITION_GAIN),
+        ("velocity gain", "1/s", "velocity_gain", able.velocity_gain, _MIN_VELOCITY_GAIN),
     ):
-        if is_now < (1.0 - _ALIKE) * least:
+        if is_now < (1.0 - _TOLERANCE) * least:
             name, value = deciding(autopilot, parameters, limit)
             yield f"a {what} of {least:g} {unit} at least: {name} {value:g} gives {is_now:.2g}"

@@ -15,8 +15,8 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message, Source
 
 _GLOBAL = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
-_HIGHEST = 1e5
-"""m; the comparison also rejects NaN."""
+_MAX_ALTITUDE = 1e5
+"""m, bound on the magnitude of altitudes; its comparison also rejects NaN."""
 
 
 class Orders:
@@ -35,7 +35,7 @@ class Orders:
         self._goals = goals
 
     def obey(self, message: Message) -> list[Message]:
-        """Execute ``message`` if it is a command; return the answers."""
+        """Execute ``message`` if it is a command to ``own``; return the COMMAND_ACK, or an empty list."""
         if not isinstance(message, CommandInt | CommandLong):
             return []
         if (message.target_system, message.target_component) != self._own:
@@ -48,7 +48,7 @@ class Orders:
         return [CommandAck(self._own, message.command, result, 0, 0, *message.source)]
 
     def _taken(self, order: CommandInt | CommandLong) -> bool | None:
-        """Return whether the command is accepted; None for an unknown one."""
+        """Execute the command and return whether it is accepted; None for an unknown one."""
         pilot = self._pilot
         if isinstance(order, CommandInt):
             return self._reposition(order) if order.command == mavlink.MAV_CMD_DO_REPOSITION else None
@@ -71,7 +71,7 @@ class Orders:
         latitude, longitude = order.x * 1e-7, order.y * 1e-7
         if order.frame not in _GLOBAL or abs(latitude) > 90.0 or abs(longitude) > 180.0:
             return False
-        if not abs(order.z) < _HIGHEST:
+        if not abs(order.z) < _MAX_ALTITUDE:
             return False
         goal = self._fleet.to_enu(latitude, longitude, order.z)
         limits = self._config.limits

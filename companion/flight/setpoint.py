@@ -39,11 +39,11 @@ def setpoint(
 ) -> SetpointLocal:
     """Return SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame.
 
-    It contains the ``horizon`` and ``yaw`` at ``time`` (µs). ``since_boot`` (µs): time_boot_ms; ``own``
-    is the sender, and its system id the target's; ``mask`` is POSITION_TARGET_TYPEMASK. ``compensation``
-    (3,), m/s², fleet-local ENU, is added to the acceleration. ``bias`` (3,), m/s, is added to the velocity
-    (``tracking``); the sum is then clipped on each axis to the larger of ``v_max`` (3,) and the planned
-    speed. The acceleration is taken ``lead`` µs later.
+    It contains the state of ``horizon`` at ``time`` (µs), and ``yaw``. ``since_boot`` (µs): time_boot_ms;
+    ``own`` is the sender, and its system id the target's; ``mask`` is POSITION_TARGET_TYPEMASK.
+    ``compensation`` (3,), m/s², fleet-local ENU, is added to the acceleration. ``bias`` (3,), m/s, is added
+    to the velocity (``tracking``); the sum is then clipped on each axis to the larger of ``v_max`` (3,) and
+    the planned speed. The acceleration is that of the horizon ``lead`` µs later.
     """
     motion = horizon.at(time)
     acceleration = horizon.at(time + lead).acceleration if lead else motion.acceleration

@@ -1,10 +1,10 @@
 """Flight state machine: connect → arm → take-off → escort → settle → land, by MAVLink commands.
 
 Each command is repeated until it is acknowledged. Nothing starts without an operator's go (a NAV_TAKEOFF
-addressed to the companion), which expires soon. Set-points are sent only in guided mode, the mode in which
-they steer, or to enter it: at the start where the autopilot requires a stream, and after a time-out has ended
-the mode. Another controller that takes the vehicle over by its mode, also during take-off and landing, keeps
-it until a new go is given.
+addressed to the companion), which expires if it has not armed the vehicle in time. Set-points are sent only
+in guided mode, in which the autopilot follows them, or to enter it: at the start where the autopilot requires
+a stream, and after a time-out has ended the mode. Another controller that takes the vehicle over by a change
+of mode, also during take-off and landing, keeps it until a new go is given.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from companion.world import View
 from mavlink_bridge.messages import CommandAck, Message, ParamValue, Source
 
 _NAN = float("nan")
-_ARMS = 2_000_000
+_ARM_REPORT_US = 2_000_000
 """µs after the last arm command during which a heartbeat may still report the vehicle as disarmed."""
-_BEATS = 1_500_000
-"""µs after a mode command within which a heartbeat must report the mode."""
-_LEAVES = 5_000_000
-"""µs after landing for which another mode is requested."""
+_MODE_REPORT_US = 1_500_000
+"""µs after an accepted mode command during which the mode is assumed without a heartbeat."""
+_LEAVE_TIMEOUT_US = 5_000_000
+"""µs after landing during which the hold mode is requested."""
 
 
 class Pilot:
@@ -53,7 +53,7 @@ class Pilot:
         self._landed_at: int | None = None
         self._returning = False
         self.landing: Landing | None = None
-        """The landing position; None before the landing."""
+        """The last landing; None before the first."""
         self._height: float | None = None
         self._go_at: int | None = None
         self._passage = Passage(0)
@@ -82,12 +82,12 @@ class Pilot:
 
     @property
     def said(self) -> str:
-        """The last warning of the autopilot."""
+        """Text of the autopilot's last warning."""
         return self.vehicle.said
 
     @property
     def refusals(self) -> list[str]:
-        """Descriptions of the commands that the autopilot refused last."""
+        """Descriptions of the last refused commands."""
         return list(self._commands.refusals)
 
     @property
@@ -108,7 +108,7 @@ class Pilot:
         profile = self.profile
         if self.guided or profile is None or self.phase is not Phase.PREPARE or not self.streaming:
             return self.guided
-        return self._commands.taken(now, mavlink.MAV_CMD_DO_SET_MODE, profile.mode_call, _BEATS)
+        return self._commands.taken(now, mavlink.MAV_CMD_DO_SET_MODE, profile.mode_call, _MODE_REPORT_US)
 
     @property
     def streaming(self) -> bool:
@@ -137,8 +137,8 @@ class Pilot:
     def _floor(self, view: View) -> float:
         """Return the height (m, fleet-local) above which an escort may begin during the climb.
 
-        It is ∞ without a target, because the vehicle would stay there, and in certified mode, because
-        committed plans begin at rest.
+        It is ∞ for a task other than the escort; without a target, because the vehicle would stay there; and
+        in certified mode, because committed plans begin at rest.
         """
         config = self._config
         if config.task != "escort" or config.avoidance == "certified" or view.target is None:
@@ -148,9 +148,10 @@ class Pilot:
     def go(self, height: float) -> bool:
         """Accept the operator's go: climb to ``height`` (m) above the start; return whether it is accepted.
 
-        A vehicle that flies already is taken over where it is; one that returns or holds continues with the
-        escort. The go is refused on the ground if the autopilot's parameters do not permit an escort, and for
-        a height outside 0.5…120 m.
+        A vehicle that flies already is taken over where it is. In escort, hold and return the escort
+        continues, whatever the height. Otherwise the go is refused for a height outside 0.5…120 m, during
+        settling and landing and after it, during take-off for another height, and before it if the
+        autopilot's parameters do not permit an escort.
         """
         if self.phase in (Phase.HOLD, Phase.RETURN, Phase.ESCORT):
             self.phase, self._returning = Phase.ESCORT, False
@@ -168,7 +169,7 @@ class Pilot:
         return True
 
     def take_back(self) -> None:
-        """Cancel a go that still waits; a take-off that has begun continues."""
+        """Cancel a go that waits for its conditions; a take-off that has begun continues."""
         if self.phase is Phase.CONNECT:
             self._height = None
 
@@ -190,39 +191,39 @@ class Pilot:
 
     @property
     def start(self) -> Array | None:
-        """Position (3,) m, fleet-local ENU, at the last go: on the ground, or where it was taken over."""
+        """Position (3,) m, fleet-local ENU, at the last take-off or take-over; None before the first."""
         return self._takeoff.start
 
     def land(self) -> bool:
         """Land, by order of the operator; return whether the order is accepted.
 
         A vehicle under way first comes to a hover clear of the others, because an autopilot that lands does
-        not avoid other vehicles. The order is refused if another controller has the vehicle, or if, before a
-        go, the vehicle flies in a mode that is neither the guided nor the hold mode. If the autopilot is
-        silent then, the order only cancels a waiting go.
+        not avoid other vehicles. The order is refused if another controller has the vehicle, or if, before
+        the take-off, the vehicle flies in a mode that is neither the guided nor the hold mode. If the
+        autopilot is silent before the take-off, the order only cancels a waiting go.
         """
         if self.phase in STEERED:
-            # A vehicle that is still on its way back lands where it is.
+            # A vehicle that is still on its way back lands where it is: that is no return.
             self._returning = self._returning and self.phase is not Phase.RETURN
             self.phase = Phase.SETTLE
         elif self.phase is Phase.PREPARE:
-            self._alight()
+            self._begin_landing()
         elif self.phase is Phase.CONNECT:
             waited = self._height is not None
             self.take_back()
             if not self.vehicle.alive:
-                # It is unknown whether it flies, and which controller has it.
+                # It is unknown whether the vehicle flies, and which controller has it.
                 return waited
             if self.vehicle.flies:
                 if not self.vehicle.left_by_us:
                     return False
-                self._alight()
+                self._begin_landing()
         return self.phase is not Phase.YIELDED
 
     def alight(self) -> None:
-        """Land because of a severe fault, by settling first if possible.
+        """Settle and then land, because of a severe fault.
 
-        If another controller has taken the vehicle over this has no effect.
+        This has no effect on the ground, during take-off, and if another controller has the vehicle.
         """
         if self.phase in STEERED:
             self.phase = Phase.SETTLE
@@ -233,16 +234,16 @@ class Pilot:
         return self.limits.lowered.limits
 
     def returned(self) -> None:
-        """Settle and land: the vehicle is where it started."""
+        """Report that the returning vehicle is at its start: it settles and lands."""
         if self.phase is Phase.RETURN:
             self.phase = Phase.SETTLE
 
     def settled(self) -> None:
-        """Land now: the vehicle hovers clear of the others."""
+        """Report that the vehicle hovers clear of the others: it lands now."""
         if self.phase is Phase.SETTLE:
-            self._alight()
+            self._begin_landing()
 
-    def _alight(self) -> None:
+    def _begin_landing(self) -> None:
         self.phase, self._landed_at = Phase.LAND, None
         self._arming = self._takeoff.asked_to_arm
         self._commands.forget()
@@ -257,15 +258,15 @@ class Pilot:
 
     def _act(self, now: int, view: View) -> list[Message]:
         if self.phase in STEERED:
-            self._keep(now)
+            self._update_owner(now)
         if self.phase is Phase.SETTLE:
             self._settle(now, view)
         if self.phase not in STEERED:
-            # The guided mode is not requested any more; otherwise a vehicle that has lost it would never
-            # land.
+            # The guided mode is not requested any more; otherwise a vehicle that has lost this mode would
+            # never land.
             self._owner = Owner.OURS
         if self._owner is Owner.LOST:
-            return self._ask_back(now)
+            return self._request_guided_mode(now)
         if self.phase is Phase.YIELDED and self.vehicle.alive and not self.vehicle.armed:
             # Disarming by another controller ends the flight.
             self._start_anew()
@@ -276,14 +277,15 @@ class Pilot:
         return self._land(now, view) if self.phase is Phase.LAND else []
 
     def _land(self, now: int, view: View) -> list[Message]:
-        """Return the landing command until it takes effect.
+        """Return the landing command until it takes effect; after disarming, what ``_leave`` returns.
 
-        It is not repeated after that: if the autopilot then leaves its landing mode, another controller has
-        ordered it. It is not sent while the autopilot is silent, because a pilot may have the vehicle.
+        The command is not repeated after it took effect: if the autopilot then leaves its landing mode,
+        another controller has ordered that. The command is not sent while the autopilot is silent, because a
+        pilot may have the vehicle.
         """
         vehicle, profile = self.vehicle, self.profile
         if vehicle.heartbeat is not None and not vehicle.armed:
-            return self._leave(now, view) if vehicle.beat_at - self._arming > _ARMS else []
+            return self._leave(now, view) if vehicle.beat_at - self._arming > _ARM_REPORT_US else []
         if not vehicle.alive:
             return []
         if profile is not None and vehicle.flies:
@@ -299,8 +301,8 @@ class Pilot:
     def _leave(self, now: int, view: View) -> list[Message]:
         """Return the mode command after disarming, and end the flight.
 
-        PX4 remains in guided mode, where its checks before the next flight fail: another mode is requested,
-        unless another one has been set already.
+        PX4 may remain in guided mode, where its checks before the next flight fail. So in guided and landing
+        modes the hold mode is requested for up to 5 s.
         """
         vehicle, profile = self.vehicle, self.profile
         if self._landed_at is None:
@@ -308,7 +310,7 @@ class Pilot:
             self._commands.forget()
             doubt, returning = vehicle.positioning.radius, self._returning
             self.landing = landed(self._config, self.start, view.own, doubt, returning=returning)
-        if profile is not None and profile.streams_first and now - self._landed_at <= _LEAVES:
+        if profile is not None and profile.streams_first and now - self._landed_at <= _LEAVE_TIMEOUT_US:
             if not vehicle.alive:
                 return []
             if vehicle.mode in profile.land_modes | {profile.guided_custom_mode}:
@@ -317,11 +319,11 @@ class Pilot:
         return []
 
     def _yield(self) -> None:
-        """Yield the vehicle to another controller."""
+        """Leave the vehicle to another controller."""
         self._owner, self.phase = Owner.OURS, Phase.YIELDED
         self._commands.forget()
 
-    def _keep(self, now: int) -> None:
+    def _update_owner(self, now: int) -> None:
         """Update the owner; if another controller has taken the vehicle over, yield to it.
 
         No commands are sent against that controller.
@@ -332,8 +334,8 @@ class Pilot:
         elif self._owner is Owner.LOST and before is not Owner.LOST:
             self._commands.forget()
 
-    def _ask_back(self, now: int) -> list[Message]:
-        """Request the guided mode again, after only the time-out has ended it."""
+    def _request_guided_mode(self, now: int) -> list[Message]:
+        """Return the request for the guided mode, which the autopilot's time-out has ended."""
         if self.profile is None:
             return []
         return self._commands.call(now, mavlink.MAV_CMD_DO_SET_MODE, self.profile.mode_call)
@@ -347,15 +349,15 @@ class Pilot:
         self._readiness.forget()
 
     def _settle(self, now: int, view: View) -> None:
-        """Land without settling if that cannot continue: own position stale, or time limit exceeded."""
+        """Land at once if the own position is stale or the time limit for settling is exceeded."""
         since = self._settling_since = now if self._settling_since is None else self._settling_since
         blind = view.own is None or view.own.age > self._config.guard.own_stale_us
         if blind or now - since > self._config.guard.settle_us:
-            self._alight()
+            self._begin_landing()
 
     def _connect(self, now: int, view: View) -> list[Message]:
         self.waiting_for = self._readiness.missing(view, go=self._height is not None)
-        self._expire(now)
+        self._expire_go(now)
         calls = self._readiness.requests(now)
         if not self.waiting_for and view.own is not None and view.local is not None:
             self._takeoff.begin(view.own)
@@ -363,7 +365,7 @@ class Pilot:
             self.phase = Phase.PREPARE
         return calls
 
-    def _expire(self, now: int) -> None:
+    def _expire_go(self, now: int) -> None:
         """Cancel a go that has not armed the vehicle within ``guard.go_keeps_us``."""
         if self._height is None:
             return
@@ -379,7 +381,7 @@ class Pilot:
             self._start_anew()
             return []
         if not self.vehicle.armed:
-            self._expire(now)
+            self._expire_go(now)
         if not self.vehicle.alive:
             # The owner is unknown until the next heartbeat; no commands are sent before it.
             return []
@@ -391,8 +393,8 @@ class Pilot:
             if not self.vehicle.armed:
                 self._start_anew()
         elif self.vehicle.flies and view.own_age > self._config.guard.own_lost_us:
-            # Without an own position the arrival would never be detected.
-            self._alight()
+            # Without an own position the end of the climb would never be detected.
+            self._begin_landing()
         if self.phase is not Phase.PREPARE or view.own is None:
             return []
         step = takeoff.step(profile)

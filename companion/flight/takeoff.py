@@ -1,4 +1,4 @@
-"""Take-off, from the ground to where the escort begins: mode, arm, climb, in the autopilot's order."""
+"""Take-off, from the ground to the begin of the escort: mode, arm, climb, in the autopilot's order."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from companion.flight.vehicle import Vehicle
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Message
 
-_STILL, _CALM = 0.3, 2_000_000
+_REST_SPEED, _REST_TIME_US = 0.3, 2_000_000
 """m/s and µs: a vehicle slower than this in the air for so long has finished its take-off."""
-_NEARLY = 0.7
-"""Share of the requested height."""
-_ENOUGH, _ROOM = 0.6, 0.2
-"""Share of the requested height, and distance (m) above the floor of plans.
+_RISEN_SHARE = 0.7
+"""Share of the requested height above which the climb may be over and the mode may have changed."""
+_ESCORT_SHARE, _FLOOR_CLEARANCE = 0.6, 0.2
+"""Share of the requested height, and distance (m) above the lowest height of plans.
 
-An escort may begin during the climb above both: the autopilot takes up to 3 s for the slow rest.
+An escort may begin during the climb above both: the autopilot takes up to 3 s for the slow end.
 """
-_THERE, _FAST = 0.3, 3.0
+_MAX_OVERSHOOT, _MAX_ESCORT_SPEED = 0.3, 3.0
 """m above the requested height, and m/s, beyond which the escort may not begin during the climb."""
-_NOT_UP = (mavlink.MAV_LANDED_STATE_UNDEFINED, mavlink.MAV_LANDED_STATE_ON_GROUND)
+_NOT_FLYING = (mavlink.MAV_LANDED_STATE_UNDEFINED, mavlink.MAV_LANDED_STATE_ON_GROUND)
 _NAN = float("nan")
 
 
 class Takeoff:
-    """The steps of one take-off; ``start``: where the last one began, (3,) m, fleet-local ENU."""
+    """Steps of a take-off; ``start``: where the last take-off began, (3,) m, fleet-local ENU."""
 
     def __init__(self, vehicle: Vehicle, calls: Commands, origin_altitude: float) -> None:
         """Take ``origin_altitude``: altitude of the fleet frame's zero, m above mean sea level."""
@@ -39,7 +39,7 @@ class Takeoff:
         self.start: Array | None = None
         self._ground = 0.0
         self._flying_already = False
-        self._calm_since: int | None = None
+        self._at_rest_since: int | None = None
         self._step = 0
         self.asked_to_arm = 0
         """When (µs) the last arm command was sent, 0 before the first."""
@@ -49,7 +49,7 @@ class Takeoff:
         self.start = own.position.copy()
         self._ground = float(own.position[2])
         self._flying_already = self._vehicle.flies
-        self._calm_since = None
+        self._at_rest_since = None
         self._step = 0
 
     def step(self, profile: Profile) -> Step | None:
@@ -59,17 +59,17 @@ class Takeoff:
     def disarmed(self, profile: Profile) -> bool:
         """Return whether the vehicle is disarmed again, after it was armed.
 
-        It was disarmed by itself or by another controller, which does not expect it to arm again.
+        The autopilot or another controller disarmed it, and must not be overridden by arming it again.
         """
         return Step.ARM in profile.steps[: self._step] and not self._vehicle.armed
 
     def risen(self, own: State, height: float) -> bool:
         """Return whether the climb to ``height`` (m above the ground) may be over.
 
-        That is so above ``_NEARLY`` of it, unless the vehicle was in flight when the take-off began.
+        That is so above ``_RISEN_SHARE`` of the height, unless the take-off began in flight.
         """
         climbed = float(own.position[2]) - self._ground
-        return not self._flying_already and climbed > _NEARLY * height
+        return not self._flying_already and climbed > _RISEN_SHARE * height
 
     def advance(
         self, now: int, profile: Profile, own: State, height: float, floor: float = inf
@@ -95,7 +95,7 @@ class Takeoff:
             done = self._flying_already or self._is_up(now, own, climbed, height, floor)
             above_sea = self._origin_altitude + self._ground + height
             altitude = above_sea if profile.takeoff_absolute else height
-            up = self._flying_already or vehicle.landed_state not in _NOT_UP
+            up = self._flying_already or vehicle.landed_state not in _NOT_FLYING
             climb = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude)
             call = [] if up else self._commands.call(now, mavlink.MAV_CMD_NAV_TAKEOFF, climb)
         if done:
@@ -107,22 +107,26 @@ class Takeoff:
     def _is_up(self, now: int, own: State, climbed: float, height: float, floor: float) -> bool:
         """Return whether the take-off is over.
 
-        It is over if the vehicle is high enough for plans to take over, if it is still at the requested
-        height, or if it has been still in the air for a while. The last condition is needed because the
-        estimated height may have drifted by more than the tolerance: the autopilot measures its height from
-        its own origin.
+        It is over if the vehicle is high and slow enough for plans to take over, if it is at rest within
+        0.3 m of the requested height, or if it has been at rest for 2 s above half of it. The last condition
+        is needed because the estimated height may have drifted by more than 0.3 m: the autopilot measures its
+        height from its own origin.
         """
         speed = float(abs(own.velocity).max())
-        still = speed < _STILL
+        at_rest = speed < _REST_SPEED
         if self._vehicle.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND:
-            self._calm_since = None
+            self._at_rest_since = None
             return False
-        if own.position[2] > floor + _ROOM and _ENOUGH * height < climbed < height + _THERE and speed < _FAST:
+        if (
+            own.position[2] > floor + _FLOOR_CLEARANCE
+            and _ESCORT_SHARE * height < climbed < height + _MAX_OVERSHOOT
+            and speed < _MAX_ESCORT_SPEED
+        ):
             return True
         in_air = self._vehicle.landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
-        if not still or not in_air or climbed < 0.5 * height:
-            self._calm_since = None
-        elif self._calm_since is None:
-            self._calm_since = now
-        waited = self._calm_since is not None and now - self._calm_since >= _CALM
-        return waited or (still and abs(climbed - height) < 0.3)
+        if not at_rest or not in_air or climbed < 0.5 * height:
+            self._at_rest_since = None
+        elif self._at_rest_since is None:
+            self._at_rest_since = now
+        waited = self._at_rest_since is not None and now - self._at_rest_since >= _REST_TIME_US
+        return waited or (at_rest and abs(climbed - height) < 0.3)

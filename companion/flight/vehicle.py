@@ -1,4 +1,4 @@
-"""State of the own autopilot as it reports it: mode, armed, on the ground, checks, warnings."""
+"""State of the own autopilot by its messages: mode, arming, landed state, pre-arm checks, warnings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mavlink_bridge.messages import (
 
 HEARTBEAT_LOST = 3_000_000
 """µs without a heartbeat after which the autopilot's mode is unknown."""
-_TEXTS = 16
+_MAX_TEXTS = 16
 
 
 class Vehicle:
@@ -35,15 +35,15 @@ class Vehicle:
         self.heartbeat: Heartbeat | None = None
         self.profile: Profile | None = None
         self.said = ""
-        """Text of the last warning; usually the reason for a refusal."""
-        self.texts: deque[StatusText] = deque(maxlen=_TEXTS)
-        """The last texts of any severity; ``told`` counts all of them."""
+        """Last text of severity warning or higher; usually the reason for a refusal."""
+        self.texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
+        """The last texts of any severity, at most 16; ``reported`` counts all texts so far."""
         self.reported = 0
         self.status: SysStatus | None = None
         self.positioning = Positioning()
         self._extended: ExtendedSysState | None = None
-        self._beaten: Heartbeat | None = None
-        self._extended_seen: ExtendedSysState | None = None
+        self._dated_heartbeat: Heartbeat | None = None
+        self._dated_extended: ExtendedSysState | None = None
         self.now = self._beat_at = self._extended_at = 0
 
     def receive(self, message: Message) -> None:
@@ -68,10 +68,10 @@ class Vehicle:
         """Set the time to ``now`` (µs) and date the messages received since the last call."""
         self.now = now
         self.positioning.tick(now)
-        if self.heartbeat is not self._beaten:
-            self._beaten, self._beat_at = self.heartbeat, now
-        if self._extended is not self._extended_seen:
-            self._extended_seen, self._extended_at = self._extended, now
+        if self.heartbeat is not self._dated_heartbeat:
+            self._dated_heartbeat, self._beat_at = self.heartbeat, now
+        if self._extended is not self._dated_extended:
+            self._dated_extended, self._extended_at = self._extended, now
 
     @property
     def beat_at(self) -> int:
@@ -80,7 +80,7 @@ class Vehicle:
 
     @property
     def alive(self) -> bool:
-        """Whether heartbeats arrive, so that the last reported mode is valid."""
+        """Whether the last heartbeat is at most 3 s old, so that the mode is valid."""
         return self.heartbeat is not None and self.now - self._beat_at <= HEARTBEAT_LOST
 
     @property
@@ -91,7 +91,7 @@ class Vehicle:
 
     @property
     def guided(self) -> bool:
-        """Whether the vehicle follows set-points now."""
+        """Whether the vehicle follows set-points now: alive, armed and in guided mode."""
         return self.alive and self.armed and self.in_guided_mode
 
     @property
@@ -107,23 +107,23 @@ class Vehicle:
 
     @property
     def flies(self) -> bool:
-        """Whether the vehicle may be in the air."""
+        """Whether the vehicle may be in the air: armed, and not reported as on the ground."""
         return self.armed and self.landed_state != mavlink.MAV_LANDED_STATE_ON_GROUND
 
     @property
     def left_by_us(self) -> bool:
-        """Whether it is in guided mode, or in the mode in which the companion leaves it."""
+        """Whether the vehicle is in guided mode, or in the hold mode, in which the companion leaves it."""
         return self.in_guided_mode or (self.profile is not None and self.mode == self.profile.hold_mode)
 
     @property
     def starved(self) -> bool:
-        """Whether it is disarmed in a mode in which its pre-arm checks fail without set-points."""
+        """Whether the vehicle is disarmed in a guided mode whose pre-arm checks fail without set-points."""
         profile = self.profile
         return profile is not None and profile.streams_first and self.in_guided_mode and not self.armed
 
     @property
     def healthy(self) -> bool:
-        """Whether its pre-arm checks have passed."""
+        """Whether the vehicle's pre-arm checks have passed."""
         return self.status is not None and bool(self.status.health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
 
     @property

@@ -4,8 +4,8 @@ The paper's destination is the nearest point of the surface (Sec. III-B). Vehicl
 then have their destinations side by side, and only the field separates them. With ``spread`` the destination
 is turned about the target's vertical towards even bearings: K vehicles in the order of their bearings, 2π/K
 apart, all turned together so that the sum of the squares of their turns is least. The order is kept, so paths
-do not cross; no message is needed except positions. A vehicle that still has to go round does so outside the
-surface.
+do not cross; no message is needed except positions. A vehicle whose place is far round the target flies there
+outside the surface.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import numpy as np
 from companion.config.formation import Spread
 from companion.values.horizon import Array
 
-_ROUND, _OUTSIDE = 0.25, 2.5
-"""Turn (rad) beyond which a vehicle stays outside the surface, and by how far (m) at one radian more."""
-_POINT = 0.1
-"""Radius (m) below which a circle has no places."""
-_FURTHER = 2.0
-"""Relative growth of the distance (1/rad) for a vehicle that has to go round by more than ``_ROUND``."""
+_FAR_TURN_RAD, _MAX_OUTWARD_M = 0.25, 2.5
+"""Turn above which a destination is moved outward, and the largest shift, reached at one radian more."""
+_MIN_RADIUS_M = 0.1
+"""Radius below which a circle is too small to be shared."""
+_SPACING_PER_RAD = 2.0
+"""Relative growth of the spacing (1/rad) of a vehicle that has to go round by more than ``_FAR_TURN_RAD``."""
 
 
 def even_turn(own: Array, others: Array) -> float:
@@ -38,16 +38,16 @@ def even_turn(own: Array, others: Array) -> float:
 
 
 def outside(offset: Array, turn: float) -> Array:
-    """Return the destination ``offset`` (3,) from the target, moved outward.
+    """Return the destination ``offset`` (3,) from the target, m, moved horizontally outward.
 
-    This is for a vehicle that still has to go round by ``turn`` (rad): further out, its way does not lead
-    through the places of the others.
+    This is for a vehicle that still has to go round by ``turn`` (rad): further out, its path does not lead
+    through the places of the others. Small turns and offsets near the vertical are not moved.
     """
-    out = min(max(abs(turn) - _ROUND, 0.0), 1.0) * _OUTSIDE
-    size = float(np.hypot(offset[0], offset[1]))
-    if not out or size < _OUTSIDE * 1e-3:
+    shift = min(max(abs(turn) - _FAR_TURN_RAD, 0.0), 1.0) * _MAX_OUTWARD_M
+    distance = float(np.hypot(offset[0], offset[1]))
+    if not shift or distance < _MAX_OUTWARD_M * 1e-3:
         return offset
-    further: Array = offset * np.array([1.0 + out / size, 1.0 + out / size, 1.0])
+    further: Array = offset * np.array([1.0 + shift / distance, 1.0 + shift / distance, 1.0])
     return further
 
 
@@ -61,11 +61,13 @@ def taking_part(config: Spread, offsets: Array, radius: float) -> Array:
 
 
 def spacing(radius: float, others: int, turn: float = 0.0) -> float:
-    """Return the distance (m) of even places on a circle of ``radius`` (m) with so many ``others``.
+    """Return the distance (m) of even places on a circle of ``radius`` (m), shared with ``others`` vehicles.
 
-    It is larger for a vehicle that still has to go round by ``turn`` (rad), so that it does not press in. It
-    is ∞ if there are no others or no places.
+    It is larger for a vehicle that still has to go round by ``turn`` (rad), so that this vehicle does not
+    push between the others. It is ∞ if ``others`` is 0 or the circle is smaller than 0.1 m.
     """
-    if not others or radius < _POINT:
+    if not others or radius < _MIN_RADIUS_M:
         return inf
-    return 2.0 * radius * sin(pi / (others + 1)) * (1.0 + _FURTHER * max(abs(turn) - _ROUND, 0.0))
+    return (
+        2.0 * radius * sin(pi / (others + 1)) * (1.0 + _SPACING_PER_RAD * max(abs(turn) - _FAR_TURN_RAD, 0.0))
+    )

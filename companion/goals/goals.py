@@ -20,16 +20,19 @@ from companion.values.obstacles import Obstacles
 from companion.values.phase import Phase
 from companion.world import View
 
-_BACK, _STILL = 0.5, 0.5
-"""Distance (m) to the start and speed (m/s) below which the vehicle is back."""
-_BELOW, _NEARBY = 1.0, 2.0
-"""Distance (m) below its lane up to which a vehicle sets off, and to its start at which it needs no lane."""
-_BESIDE, _PATIENCE = 5.0, 10_000_000
-"""Distance (m) and time (µs): a vehicle this near that has come no nearer for so long is back, too."""
+_RETURNED_WITHIN_M, _RETURNED_BELOW_M_S = 0.5, 0.5
+"""Horizontal distance to the start, and speed, below which the vehicle is back above its start.
+
+The distance is also the least decrease that counts as progress.
+"""
+_LANE_TOLERANCE_M, _NO_LANE_WITHIN_M = 1.0, 2.0
+"""A vehicle sets off for its start when it is at most the first below its lane, or within the second."""
+_BLOCKED_WITHIN_M, _NO_PROGRESS_TIMEOUT_US = 5.0, 10_000_000
+"""A vehicle within this distance of its start that has come no nearer for this time is back, too."""
 
 
-_NOBODY = np.empty((0, 3))
-_NOBODY.flags.writeable = False
+_NO_POSITIONS = np.empty((0, 3))
+_NO_POSITIONS.flags.writeable = False
 
 
 class Flight(Protocol):
@@ -51,7 +54,7 @@ class Flight(Protocol):
         ...
 
     def returned(self) -> None:
-        """Report that the vehicle is back above its start."""
+        """Report that the vehicle is back above its start, or as near to it as it can get."""
         ...
 
     def settled(self) -> None:
@@ -63,7 +66,7 @@ class Goals:
     """Destinations of the vehicle of ``system``.
 
     ``pilot`` gives the phase, and receives a report when the vehicle is back and when it has settled.
-    ``lookahead_s``: how far ahead a plan ends, s.
+    ``lookahead_s``: time (s) from now to the end of a plan.
     """
 
     def __init__(self, config: CompanionConfig, system: int, pilot: Flight, lookahead_s: float) -> None:
@@ -82,12 +85,12 @@ class Goals:
         self.goal: Array | None = None
         """Ordered goal (3,) of the task ``goto``, m, fleet-local ENU; None for where steering began."""
 
-    def begin(self, place: Array) -> None:
-        """Start to steer from ``place`` (3,), m, for the first time or again."""
-        self._began = place
+    def begin(self, position: Array) -> None:
+        """Record that steering begins, for the first time or again, at ``position`` (3,), m."""
+        self._began = position
 
     def forget(self, view: View) -> None:
-        """Discard what belongs to an earlier phase, or to a target that was lost before."""
+        """Discard the state of an earlier phase, and the position held while the target was lost."""
         phase = self._pilot.phase
         if phase is not self._phase:
             self._phase, self._held = phase, None
@@ -103,35 +106,41 @@ class Goals:
         view: View,
         measured: Motion,
         obstacles: Obstacles,
-        mates: Array = _NOBODY,
-        below: int = 0,
+        neighbours: Array = _NO_POSITIONS,
+        smaller_ids: int = 0,
         *,
         cautious: bool,
     ) -> Aim:
         """Return the aim of a plan at ``now`` (µs) from ``measured`` on.
 
-        ``cautious`` limits the way within a horizon to what ``guard.cautious_speed`` covers. ``obstacles``:
-        what settling keeps clear of. ``mates`` (M, 3), m: positions of the others that share the surface.
-        ``below``: how many of the others have a smaller id. Raises SurfaceError where the surface has no
-        nearest point.
+        ``cautious`` limits the distance to the destination to what ``guard.cautious_speed`` covers within a
+        horizon. ``obstacles``: what settling keeps clear of. ``neighbours`` (M, 3), m: positions of those
+        that share the surface. ``smaller_ids``: how many neighbours have a smaller id. Raises SurfaceError if
+        the function of a user's surface fails.
         """
         step = self._config.guard.return_step
-        self._lane = step * below + self._clearance if step else 0.0
-        aim = self._destination(now, view, measured, obstacles, mates)
+        self._lane = step * smaller_ids + self._clearance if step else 0.0
+        aim = self._destination(now, view, measured, obstacles, neighbours)
         speed = self._config.guard.cautious_speed
         return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
 
     def _shortened(self, aim: Aim, measured: Motion, speed: float) -> Aim:
-        """Return the aim in the same direction, but no further than ``speed`` (m/s) goes in a horizon."""
-        drift = aim.target_end - aim.target
-        way = aim.destination - drift - measured.position
-        far = float(np.linalg.norm(way))
-        most = speed * 1e-6 * self._config.horizon.dt_us * (self._config.horizon.steps + 1)
-        if far <= most:
-            return aim
-        return aim._replace(destination=measured.position + drift + most / far * way)
+        """Return the aim in the same direction, but no further than ``speed`` (m/s) covers in a horizon.
 
-    def _destination(self, now: int, view: View, measured: Motion, obstacles: Obstacles, mates: Array) -> Aim:
+        The motion of the target within the horizon is added to this distance.
+        """
+        drift = aim.target_end - aim.target
+        offset = aim.destination - drift - measured.position
+        distance = float(np.linalg.norm(offset))
+        longest = speed * 1e-6 * self._config.horizon.dt_us * (self._config.horizon.steps + 1)
+        if distance <= longest:
+            return aim
+        return aim._replace(destination=measured.position + drift + longest / distance * offset)
+
+    def _destination(
+        self, now: int, view: View, measured: Motion, obstacles: Obstacles, neighbours: Array
+    ) -> Aim:
+        """Return the aim of the present phase and task, before ``cautious`` shortens it."""
         target, phase, task = view.target, self._pilot.phase, self._config.task
         if phase is Phase.RETURN:
             place = self._way_back(now, measured)
@@ -143,18 +152,18 @@ class Goals:
             began = measured.position if self._began is None else self._began
             place = began if self.goal is None else self.goal
         elif phase is not Phase.HOLD and target is not None:
-            return self._around(target, measured, mates)
+            return self._around(target, measured, neighbours)
         else:
-            # Ordered to hold, or there is no target: hold the position, clear of the others.
+            # Ordered to hold, or there is no target: hold the position.
             place = self._place_to_hold(measured)
         return standing(place, None if target is None else target.position)
 
-    def _around(self, target: State, measured: Motion, mates: Array) -> Aim:
+    def _around(self, target: State, measured: Motion, neighbours: Array) -> Aim:
         """Return the aim on the surface around the target's position at the end of the horizon."""
         ahead, rate, surface = self._lookahead_s, self._config.turn_rate, self._surface
         (end,), (velocity,) = target.ahead(np.array([ahead]))
         here = measured.position - target.position
-        turn, apart = self._turn(here, mates - target.position)
+        turn, apart = self._turn(here, neighbours - target.position)
         offset = surface.nearest(turned(here, turn) if turn else here)
         if rate:
             offset = surface.nearest(turned(offset, rate * ahead))
@@ -163,20 +172,20 @@ class Goals:
             offset = outside(offset, turn)
         return Aim(end + offset, velocity, target.position, end, surface, apart)
 
-    def _turn(self, offset: Array, mates: Array) -> tuple[float, float]:
+    def _turn(self, offset: Array, neighbours: Array) -> tuple[float, float]:
         """Return the angle (rad) by which to go round, and the spacing.
 
         ``offset`` (3,), m, is the vehicle's from the target. The angle leads towards the vehicle's place
-        among ``mates`` (M, 3), also offsets from the target. The spacing (m) is the distance to keep from
-        them, ∞ where the surface is not shared.
+        among ``neighbours`` (M, 3), also offsets from the target. The spacing (m) is the distance to keep
+        from them, ∞ where the surface is not shared or a neighbour is too far away to take part.
         """
         formation = self._config.formation
-        if not isinstance(formation, Spread) or not len(mates):
+        if not isinstance(formation, Spread) or not len(neighbours):
             return 0.0, inf
         here = self._surface.nearest(offset)
-        others = taking_part(formation, mates, float(np.linalg.norm(here)))
+        others = taking_part(formation, neighbours, float(np.linalg.norm(here)))
         turn, apart = even_turn(offset, others), inf
-        if 0 < len(others) == len(mates):
+        if 0 < len(others) == len(neighbours):
             apart = spacing(hypot(here[0], here[1]), len(others), turn)
         return max(-formation.turn, min(formation.turn, turn)), apart
 
@@ -187,9 +196,9 @@ class Goals:
         return self._held
 
     def _above_target(self, system: int) -> float:
-        """Return the climb (m) from the surface after which the target no longer repels the vehicle.
+        """Return the climb (m) from the surface's lowest point to where the target no longer repels.
 
-        A vehicle that the target pushes up on its way back would come into the lane above.
+        Otherwise the target could push a returning vehicle up into the lane above.
         """
         config = self._config
         if config.task != "escort" or config.target_d_safe is None:
@@ -201,8 +210,8 @@ class Goals:
         """Return the place (3,), m, to return to: above the start.
 
         Its height is the one at the order to return plus the vehicle's lane. It is clipped to the box. A
-        vehicle with a lane climbs to it first: while all climb, lanes do not separate them. The pilot
-        receives a report when the vehicle is there, or when it is beside the place and comes no nearer.
+        vehicle with a lane climbs to it first: lanes separate the vehicles only once they have been reached.
+        The pilot receives a report when the vehicle is there, or when it is near and comes no nearer.
         """
         start = self._pilot.start
         if start is None:
@@ -211,14 +220,17 @@ class Goals:
         height = float(held[2]) + self._lane
         above: Array = np.clip(np.array([start[0], start[1], height]), self._low, self._high)
         off = above - measured.position
-        far = hypot(off[0], off[1])
-        if self._lane and off[2] > _BELOW and far > _NEARBY:
+        distance = hypot(off[0], off[1])
+        if self._lane and off[2] > _LANE_TOLERANCE_M and distance > _NO_LANE_WITHIN_M:
             self._nearer_at = now
             return np.array([held[0], held[1], above[2]])
-        if far >= _BESIDE or far < self._nearest - _BACK:
-            self._nearest, self._nearer_at = far, now
-        there = far < _BACK and float(measured.velocity @ measured.velocity) < _STILL**2
-        # A vehicle whose place is taken may go round it for ever.
-        if there or (far < _BESIDE and now - self._nearer_at > _PATIENCE):
+        if distance >= _BLOCKED_WITHIN_M or distance < self._nearest - _RETURNED_WITHIN_M:
+            self._nearest, self._nearer_at = distance, now
+        there = (
+            distance < _RETURNED_WITHIN_M
+            and float(measured.velocity @ measured.velocity) < _RETURNED_BELOW_M_S**2
+        )
+        # Without a time-out, a vehicle whose place is occupied could circle the place for ever.
+        if there or (distance < _BLOCKED_WITHIN_M and now - self._nearer_at > _NO_PROGRESS_TIMEOUT_US):
             self._pilot.returned()
         return above

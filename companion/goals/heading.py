@@ -18,7 +18,8 @@ from companion.errors import SolverError
 from companion.values.horizon import Array
 from companion.values.prediction import prediction
 
-_EVERY = 2
+_STRIDE = 2
+"""Number of the path's steps in one step of the yaw plan."""
 
 
 class Yaw(NamedTuple):
@@ -33,15 +34,15 @@ class Heading:
     """Yaw planner of one vehicle; each plan starts from the state of the last one."""
 
     def __init__(self, config: HeadingConfig, horizon: HorizonConfig) -> None:
-        # Half as many steps as the path has, of twice the length: yaw is slow.
-        n, dt = (horizon.steps + 1) // _EVERY, _EVERY * horizon.dt_us * 1e-6
+        # Yaw is slow: longer steps than the path's suffice.
+        n, dt = (horizon.steps + 1) // _STRIDE, _STRIDE * horizon.dt_us * 1e-6
         self._config, self._dt, self._n = config, dt, n
         self._S_v, self._S_x, self._ahead = prediction(n, dt)
         P: Array = 2.0 * (self._S_x.T @ self._S_x + config.effort * np.eye(n))
         self._minimiser: Array = -np.asarray(np.linalg.inv(P), dtype=np.float64)
         self._bounded, self._limited = QpSolver(P), QpSolver(P, self._S_v)
         self._limit: Array = np.full(n, config.acceleration_max)
-        self._swing = config.acceleration_max * float(self._ahead[-1])
+        self._max_rate_change = config.acceleration_max * float(self._ahead[-1])
         self._start: int | None = None
         self._state = Yaw(0.0, 0.0, 0.0)
         self._accelerations: Array = np.zeros(n)
@@ -54,13 +55,13 @@ class Heading:
     def plan(self, now: int, positions: Array, targets: Array) -> None:
         """Plan from ``now`` (µs) along the own ``positions`` (N + 1, 3), facing ``targets`` (N + 1, 3), m.
 
-        Both are those at n = 1…N + 1. Without a solution the last yaw plan is kept.
+        Both are given at n = 1…N + 1. If the QP has no solution, the last yaw plan is kept.
         """
         state = self.at(now)
-        last = _EVERY * self._n
-        offset = targets[_EVERY - 1 : last : _EVERY] - positions[_EVERY - 1 : last : _EVERY]
+        last = _STRIDE * self._n
+        offset = targets[_STRIDE - 1 : last : _STRIDE] - positions[_STRIDE - 1 : last : _STRIDE]
         bearings = np.arctan2(offset[:, 1], offset[:, 0])
-        # Above or below the target no bearing is better than another.
+        # Straight above or below the target its bearing is undefined: the present yaw takes its place.
         blind = np.abs(offset[:, :2]).max(axis=1) < self._config.blind
         if blind.any():
             bearings[blind] = state.yaw
@@ -90,15 +91,15 @@ class Heading:
         return Yaw(yaw + s * rate + 0.5 * s * s * acceleration, rate + s * acceleration, acceleration)
 
     def _solve(self, c: Array, rate: float) -> Array:
-        """Return the free minimiser (n,) if it keeps all bounds, otherwise PIQP's solution."""
+        """Return the unconstrained minimiser (n,) where it surely keeps all bounds, else PIQP's solution."""
         limit, bound = self._limit, self._config.rate_max
         a: Array = self._minimiser @ c
         largest = float(np.abs(a).max())
         if largest <= limit[0] and abs(rate) + largest * float(self._ahead[-1]) <= bound:
             return a
-        if abs(rate) + self._swing <= bound:
+        if abs(rate) + self._max_rate_change <= bound:
             return self._bounded.solve(c, -limit, limit)
-        # A rate that already exceeds the bound must be allowed, or there is no solution.
+        # A present rate above the bound must be allowed, otherwise there is no solution.
         rows = np.full(self._n, max(bound, abs(rate)))
         return self._limited.solve(c, -limit, limit, -rows - rate, rows - rate)
 

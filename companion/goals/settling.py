@@ -1,4 +1,4 @@
-"""Coming to a hover before landing: stop while avoiding obstacles, and move aside of one that is below."""
+"""Coming to a hover before landing: stop while avoiding obstacles, and move away from a near one."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from companion.config import CompanionConfig
 from companion.values.horizon import Array, Motion
 from companion.values.obstacles import Obstacles
 
-_ASIDE = 0.5
-"""Distance (m) beyond the clearance when moving aside to land."""
-_PASSES, _WAITS = 1.0, 5_000_000
-"""Motion (m in a horizon) above which an obstacle is passing, and how long (µs) to wait for it."""
-_NEAR = 1e-3
+_EXTRA_CLEARANCE_M = 0.5
+"""Distance beyond ``guard.landing_clearance`` when moving aside to land."""
+_MIN_PASSING_M, _MAX_WAIT_US = 1.0, 5_000_000
+"""Motion within a horizon above which an obstacle is passing, and the longest wait for it."""
+_MIN_DISTANCE_M = 1e-3
 _EAST = np.array([1.0, 0.0])
 
 
 class Settling:
     """Place to come to rest before landing.
 
-    ``clear`` is set once the vehicle is slow there and no obstacle is near horizontally, because landing is
-    straight down.
+    ``clear``: whether no obstacle was near horizontally when ``rest`` was last called with a speed below
+    ``guard.landing_speed``. Heights do not count, because landing is straight down.
     """
 
     def __init__(self, config: CompanionConfig) -> None:
@@ -32,8 +32,8 @@ class Settling:
     def rest(self, now: int, measured: Motion, obstacles: Obstacles) -> Array:
         """Return the place (3,), m, to go to at ``now`` (µs).
 
-        It is where braking from the first call on ends, or beside an obstacle that is in the way, since a
-        landed vehicle will not go away. The vehicle waits for an obstacle that passes.
+        It is where braking from the first call on ends, clipped to the box; or a place beside a near
+        obstacle, which may be a landed vehicle and stay. The vehicle waits for an obstacle that passes.
         """
         config, here = self._config, measured.position
         speed = float(np.linalg.norm(measured.velocity))
@@ -52,7 +52,7 @@ class Settling:
         return self._rest
 
     def _in_the_way(self, here: Array, obstacles: Obstacles) -> int | None:
-        """Return the index of the nearest obstacle; None if it is far enough away."""
+        """Return the index of the horizontally nearest obstacle; None without one within the clearance."""
         distance = np.linalg.norm(here[:2] - obstacles.positions[:, 0, :2], axis=1) - obstacles.radius
         if distance.min(initial=np.inf) > self._config.guard.landing_clearance:
             return None
@@ -60,17 +60,17 @@ class Settling:
 
     def _waits(self, now: int, positions: Array) -> bool:
         """Return whether an obstacle at ``positions`` (N + 1, 3) passes and may still be waited for."""
-        way = positions[-1, :2] - positions[0, :2]
-        if float(np.hypot(way[0], way[1])) < _PASSES:
+        motion = positions[-1, :2] - positions[0, :2]
+        if float(np.hypot(motion[0], motion[1])) < _MIN_PASSING_M:
             self._waiting_since = None
             return False
         self._waiting_since = now if self._waiting_since is None else self._waiting_since
-        return now - self._waiting_since < _WAITS
+        return now - self._waiting_since < _MAX_WAIT_US
 
     def _beside(self, here: Array, centre: Array, radius: float) -> Array:
-        """Return a place (3,), m, clear of an obstacle at ``centre`` (3,)."""
-        apart = here[:2] - centre[:2]
-        size = float(np.hypot(apart[0], apart[1]))
-        away = apart / size if size > _NEAR else _EAST
-        room = radius + self._config.guard.landing_clearance + _ASIDE
-        return np.append(centre[:2] + room * away, here[2])
+        """Return a place (3,), m, at the present height, clear of an obstacle at ``centre`` (3,)."""
+        offset = here[:2] - centre[:2]
+        length = float(np.hypot(offset[0], offset[1]))
+        away = offset / length if length > _MIN_DISTANCE_M else _EAST
+        distance = radius + self._config.guard.landing_clearance + _EXTRA_CLEARANCE_M
+        return np.append(centre[:2] + distance * away, here[2])

@@ -36,12 +36,12 @@ class MovingObstacles:
         margin: float,
         vehicles: float,
     ) -> Obstacles:
-        """Return ``others`` with the sizes of those that are moving obstacles.
+        """Return ``others`` with the configured sizes of the moving obstacles among them.
 
         ``d_min`` and ``d_safe`` (m, for a point) grow by the radius and ``margin``. A post is placed at the
         point of its axis nearest to the own ``prediction`` (N + 1, 3). Where the radius in ``others`` exceeds
-        the margin of ``vehicles`` (m), the excess is the uncertainty of the position, and the obstacle is
-        enlarged by that.
+        the margin of ``vehicles`` (m), the excess is the uncertainty of the position, by which the obstacle
+        is enlarged.
         """
         found = [(j, self._rows[name]) for j, name in enumerate(others.ids) if name in self._rows]
         if not found:
@@ -59,7 +59,7 @@ class MovingObstacles:
     def distance(self, points: Array, places: Array) -> Array:
         """Return the distances (…, K, M), m, from ``points`` (…, K, 3) to obstacles at ``places`` (…, M, 3).
 
-        They are measured to the surfaces and are negative inside.
+        Distances are measured to the surfaces and are negative inside.
         """
         off = points[..., :, None, :2] - places[..., None, :, :2]
         top = np.where(self._ball, places[..., 2], self._top)

@@ -33,12 +33,12 @@ from mavlink_bridge.messages import GlobalPosition, Tunnel
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 
-_MOST = 255
+_SYSTEM_IDS = 255
 """Number of system ids."""
-_PRIORITY = 1_000_000
-"""µs after a companion's position during which positions from the same vehicle's autopilot are ignored."""
-_STRAYED = 1.0
-"""m; a neighbour further than this from its own plan is not following it: its track is used instead.
+_PRIORITY_US = 1_000_000
+"""µs after a companion's position during which positions of the same vehicle's autopilot are ignored."""
+_MAX_PLAN_DEVIATION = 1.0
+"""m; if a neighbour is further than this from its plan, its track is used instead of the plan.
 
 With ``guard.astray_us`` the limit is ``guard.tube``.
 """
@@ -58,7 +58,7 @@ def _read(payload: bytes) -> tuple[int, Horizon]:
 
 @lru_cache(maxsize=1024)
 def _placed(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measured | None:
-    """Return what a message measures, as ``measured`` does; each message is converted once per process."""
+    """Return the measurement in a message, None if invalid; each message is converted once per process."""
     position = fleet.to_enu(message.latitude, message.longitude, message.altitude)
     return measured(position, ned_to_enu(message.velocity_ned), upward=upward)
 
@@ -94,12 +94,12 @@ class Neighbours:
         self._arrivals = np.zeros(0, dtype=np.int64)
         self._clocks: dict[int, PlanClock] = {}
         self._fading = fading(config)
-        self._strayed = _STRAYED if self._fading is None else config.guard.tube
+        self._max_plan_deviation = _MAX_PLAN_DEVIATION if self._fading is None else config.guard.tube
         self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
         margin = config.field.margin(2)
-        self._margin: Array = np.full(_MOST, margin)
-        self._d_min: Array = np.full(_MOST, config.field.d_min + margin)
-        self._d_safe: Array = np.full(_MOST, config.field.d_safe + margin)
+        self._margin: Array = np.full(_SYSTEM_IDS, margin)
+        self._d_min: Array = np.full(_SYSTEM_IDS, config.field.d_min + margin)
+        self._d_safe: Array = np.full(_SYSTEM_IDS, config.field.d_safe + margin)
         self.refused_plans = 0
         self.closest = inf
         """m: least distance to a neighbour so far, by its messages; updated if ``guard.near`` is set."""
@@ -134,8 +134,8 @@ class Neighbours:
         if system == self._system:
             return
         by_autopilot = component == mavlink.MAV_COMP_ID_AUTOPILOT1
-        if by_autopilot and now - self._companion_time.get(system, now - _PRIORITY) < _PRIORITY:
-            # Its companion reports the position already, dated by another clock.
+        if by_autopilot and now - self._companion_time.get(system, now - _PRIORITY_US) < _PRIORITY_US:
+            # The vehicle's companion reports the position already, dated by another clock.
             return
         track = self._tracks.get(system)
         if track is None or self._by_autopilot[system] != by_autopilot:
@@ -165,8 +165,8 @@ class Neighbours:
     def receive_plan(self, now: int, message: Tunnel) -> None:
         """Receive a neighbour's TUNNEL message: its horizon, or the uncertainty of its position.
 
-        A horizon in another fleet frame, from the future or from long ago is refused, unless the reason is
-        that the sender's clock is wrong.
+        A horizon in another fleet frame is refused, and so is one from the future or from long ago, unless
+        ``PlanClock`` attributes that to a wrong clock of the sender.
         """
         system = message.source.system
         if system == self._system or message.payload_type not in (PAYLOAD_TYPE, DOUBT):
@@ -224,8 +224,9 @@ class Neighbours:
         With ``places`` (P, 3) only those are returned that may affect a plan that begins at one of them.
 
         A neighbour that falls silent remains an obstacle at its last position, extrapolated for a bounded
-        time: it may well be there. With ``guard.flown_on_us`` its vehicle may have stopped, or its autopilot
-        may have flown on: the obstacle then covers that whole path (``flown_on``). A measurement with an old
+        time. With ``guard.flown_on_us`` its vehicle may have stopped, or its autopilot
+        may have flown on: the obstacle then covers the
+        whole path between (``flown_on``). A measurement with an old
         date that arrived only now was delayed, or is dated by a clock that has restarted and is not
         synchronised yet: then both its reported and its extrapolated position are covered, and a plan that
         passes one of them is accepted.
@@ -252,11 +253,12 @@ class Neighbours:
         positions, trusted = self._table.positions(ids, now, now - stale)
         begins, silent = positions[:, 0], age > stale
         if silent.any():
-            # Late means delayed by more than every message is: a neighbour that has just fallen silent is not
-            # late.
+            # Late: a message has arrived recently, but its date is old. A neighbour that has just fallen
+            # silent is not late.
             late = silent & (since <= stale - config.neighbour.delay_us)
             beside = late & (
-                _beside(begins, states[:, 0:3], self._strayed) | _beside(begins, here, self._strayed)
+                _within(begins, states[:, 0:3], self._max_plan_deviation)
+                | _within(begins, here, self._max_plan_deviation)
             )
             held = silent if config.guard.flown_on_us else late
             if held.any():
@@ -264,11 +266,11 @@ class Neighbours:
                 here[held], further[held] = self._held(
                     names, states[held], times[held], age[held], late[held]
                 )
-            trusted &= beside | (~late & _beside(begins, here, self._strayed))
+            trusted &= beside | (~late & _within(begins, here, self._max_plan_deviation))
         else:
-            trusted &= _beside(begins, here, self._strayed)
+            trusted &= _within(begins, here, self._max_plan_deviation)
         if self._fading is not None:
-            # The vehicle is beside its plan, and returns to it.
+            # A vehicle beside its plan is assumed to return to it exponentially.
             positions += np.where(trusted & ~silent, 1.0, 0.0)[:, None, None] * (
                 self._fading * (here - begins)[:, None, :]
             )
@@ -296,9 +298,9 @@ class Neighbours:
     def _held(
         self, ids: Sequence[int], states: Array, times: Ages, ages: Ages, late: NDArray[np.bool_]
     ) -> Ball:
-        """Return balls that contain all places where the vehicles with last ``states`` (M, 6) may be by now.
+        """Return balls that contain all places where vehicles with the last ``states`` (M, 6) may be.
 
-        They reach from the last certain position (for ``late`` ones: from the reported one) to where the
+        The balls reach from the last certain position (for ``late`` ones: from the reported one) to where the
         vehicle may have flown. ``times``, ``ages`` (M,) in µs.
         """
         guard = self._config.guard
@@ -311,7 +313,7 @@ class Neighbours:
     def nearest(self, now: int, own: State | None) -> tuple[int, float] | None:
         """Return system id and distance (m) of the neighbour nearest to the ``own`` position.
 
-        The distance follows from the received messages. Returns None without an own state, without
+        It is the distance to the extrapolated track. Returns None without an own state, without
         ``guard.near`` and without neighbours.
         """
         if own is None or self._config.guard.near is None or not self._ids:
@@ -380,10 +382,7 @@ class Neighbours:
         self._fresh.clear()
 
 
-def _beside(planned: Array, places: Array, strayed: float) -> NDArray[np.bool_]:
-    """Return which (M,) of the ``planned`` places (M, 3) are within ``strayed`` (m) of ``places``.
-
-    The plans of those neighbours are trusted.
-    """
+def _within(planned: Array, places: Array, strayed: float) -> NDArray[np.bool_]:
+    """Return which (M,) of the ``planned`` places (M, 3) are within ``strayed`` (m) of ``places`` (M, 3)."""
     off = planned - places
     return np.asarray(np.vecdot(off, off) <= strayed**2)

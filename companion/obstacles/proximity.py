@@ -1,10 +1,10 @@
 """Obstacles seen by the own distance sensors (OBSTACLE_DISTANCE): posts with a short lifetime.
 
-A return means that there is something at its range, somewhere in its sector. It becomes a post that covers
-the arc of the sector at that range, at every height, because heights are unknown. Returns that lie close
-together become one post, which is enlarged accordingly. So every return of the last ``age_us`` lies inside a
-post; behind it, and outside the sensors' fields of view, nothing is known. A sensor that tilts with the
-vehicle is treated as level.
+A return means that an object is at its range, somewhere in its sector. It becomes a post that covers the arc
+of the sector at that range, at every height, because heights are unknown. Returns nearer to each other than
+``spacing`` become one post; every post is enlarged by ``spacing``. So the returns of the last ``age_us`` lie
+inside posts, of which the nearest ``most`` are kept; behind them, and outside the sensors' fields of view,
+nothing is known. A sensor that tilts with the vehicle is treated as level.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ FIRST_ID = 10_000
 _FROM_NORTH = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_LOCAL_NED)
 """Frames in which angles are relative to north; in MAV_FRAME_BODY_FRD they are relative to the nose."""
 _SENSORS = 8
-"""Maximum number of sensors, and of messages within ``_OFTEN``."""
-_OFTEN = 20_000
+"""Maximum number of sensors, and of messages within ``_MIN_INTERVAL_US``."""
+_MIN_INTERVAL_US = 20_000
 """µs; least interval between two messages of one sensor about the same sectors; others are skipped."""
 _LEAST_SECTOR = 1e-3
 """rad; least width of a sector."""
@@ -62,7 +62,7 @@ class _Post(NamedTuple):
     time: int
 
     def off(self, x: float, y: float) -> float:
-        """Return the square of the distance (m²) to the point (``x``, ``y``)."""
+        """Return the square of the horizontal distance (m²) to the point (``x``, ``y``)."""
         return (self.x - x) ** 2 + (self.y - y) ** 2
 
 
@@ -89,8 +89,7 @@ def returns(scan: ObstacleDistance, reach: float) -> Returns | None:
 class Proximity:
     """Posts from the distance sensors of one vehicle.
 
-    ``refused`` counts messages that were invalid, came from one sensor too many, or exceeded eight within 20
-    ms.
+    ``refused`` counts messages that were invalid, came from a ninth sensor, or exceeded eight within 20 ms.
     """
 
     def __init__(self, config: ProximityConfig) -> None:
@@ -111,7 +110,9 @@ class Proximity:
         """
         sensor = scan.source, scan.sensor
         look = _Look(*sensor, scan.frame, scan.offset, scan.increment)
-        self._lately = {one: received for one, received in self._lately.items() if now - received < _OFTEN}
+        self._lately = {
+            one: received for one, received in self._lately.items() if now - received < _MIN_INTERVAL_US
+        }
         if look in self._lately:
             return
         found = returns(scan, self._config.reach)
@@ -132,9 +133,9 @@ class Proximity:
         del self._posts[self._config.most :]
 
     def around(self, now: int, prediction: Array, reach: float) -> Axes:
-        """Return the posts whose surface is within ``reach`` (m) of some predicted position (n, 3).
+        """Return the posts whose surface is within ``reach`` (m) of some ``prediction`` (n, 3), horizontally.
 
-        The posts' points are at the height of the prediction.
+        The points of their axes are at the heights of the prediction.
         """
         self._forget(now)
         places = np.array([(post.x, post.y) for post in self._posts]).reshape(-1, 2)
@@ -169,7 +170,7 @@ class Proximity:
     def _take(self, when: int, points: Array, radii: Array) -> None:
         """Merge new returns into the posts.
 
-        A post that is seen again keeps its id, because avoidance methods remember on which side they pass it.
+        A post that is seen again keeps its id, because avoidance methods store on which side they pass it.
         A return near a post of the same message becomes part of that post.
         """
         old, new, near = self._posts, list[_Post](), self._config.spacing**2

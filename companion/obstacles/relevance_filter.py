@@ -1,20 +1,23 @@
-"""Relevance filter: skips messages of neighbours too distant to affect the plan for a while.
+"""Relevance filter: skips messages of neighbours that are too distant to affect the own plans.
 
 The bound: a neighbour affects a vehicle's plan if, at some time within the horizon H, it is nearer than
 ``reach``: the distance at which the field, the band and the angles act when closing at c, the sum of both
-speeds. Neither vehicle is faster than the norm of ``limits.v_max``, or than its measured speed. Consider a
-neighbour at a distance d whose last state is ``age`` old, with a speed v. Until the end of the plans that are
-made within S + P from now, it approaches by at most c·(S + P + H) + v·``age``. So it is ignored for at most
+speeds. Neither vehicle is faster than v, the norm of ``limits.v_max``, so c = 2 v. Consider a neighbour at a
+distance d from the own position, where its state is ``age`` old and the own state ``own_age``, and where it
+may be ``_MAX_PLAN_OFFSET`` off its plan. Until the end of the plans that are made within S + P from now, both
+approach by at most c·(S + P + H) + v·(``age`` + ``own_age``). So it is ignored for at most
 
-    S = (d − reach(c) − v·age) / c − P − H
+    S = (d − reach(c) − v·(age + own_age) − _MAX_PLAN_OFFSET) / c − P − H
 
-P is two message periods of the own vehicle: one message may be lost, and the next one is still received in
-time. No neighbour is ignored for longer than ``_LONGEST`` after its last message: the displayed ages remain
-those of a neighbour that is present.
+P is twice the longer of the own state and plan periods: one message may be lost, and the next one is still
+received in time. Neighbours are assumed to send at the same rates. No neighbour is ignored when its last
+state is older than 0.7 s, ``neighbour.extrapolate_us`` or a quarter of ``guard.neighbour_lost_us``: the
+displayed ages remain those of a neighbour that is present.
 
-Only trusted peers (``trusted_peers``) that were not measured to be faster than the limits are ignored, and
-none while the own position is unknown. Neighbours above or below the own position are passed to the planner
-from any height, because vehicles land straight down. The certified mode receives and uses all messages, since
+Only trusted peers (``trusted_peers``) that were not measured to be faster than v are ignored, and none while
+the own position is unknown or the own speed exceeds v. ``near`` selects the neighbours for a plan by the same
+bound, with their measured speeds where these exceed v. It also keeps those above or below the own position at
+any height, because vehicles land straight down. The certified mode receives and uses all messages, since
 there the commitments of a neighbour count and not its position; so does the swivel method, which uses all
 bearings.
 """
@@ -34,10 +37,14 @@ from companion.obstacles.reachable_ball import further, norms
 from companion.values.horizon import Array
 
 Ages = NDArray[np.int64]
-_LONGEST = 700_000
-"""µs of age; after a second without its companion an autopilot counts as its vehicle's only sender."""
-_OFF_PLAN = 1.0
-"""m by which a trusted plan may begin beside its sender's track."""
+_MAX_AGE_US = 700_000
+"""µs, largest age of the last state of an ignored neighbour.
+
+It is less than the second (``neighbours``) after which the positions of a vehicle's autopilot are used
+instead of those of its silent companion.
+"""
+_MAX_PLAN_OFFSET = 1.0
+"""m between a trusted plan and its sender's track, at most."""
 
 
 class RelevanceFilter:
@@ -48,32 +55,34 @@ class RelevanceFilter:
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
-        self._fastest = hypot(*config.limits.v_max)
-        self._ahead = 1e-6 * config.horizon.dt_us * (config.horizon.steps + 1)
-        self._silence = 2e-6 * max(config.rates.state_us, config.rates.plan_us)
-        self._longest = 1e-6 * min(
-            _LONGEST, config.neighbour.extrapolate_us, config.guard.neighbour_lost_us // 4
+        self._max_speed = hypot(*config.limits.v_max)
+        self._horizon_s = 1e-6 * config.horizon.dt_us * (config.horizon.steps + 1)
+        self._message_gap_s = 2e-6 * max(config.rates.state_us, config.rates.plan_us)
+        self._max_age_s = 1e-6 * min(
+            _MAX_AGE_US, config.neighbour.extrapolate_us, config.guard.neighbour_lost_us // 4
         )
-        self._shown = max(config.neighbour.extrapolate_us, config.guard.flown_on_us)
-        # Distance (m) by which a silent vehicle may have been accelerated off its course.
-        self._driven = config.limits.a_total * float(further(np.array(1e-6 * config.guard.flown_on_us)))
+        self._extrapolate_us = max(config.neighbour.extrapolate_us, config.guard.flown_on_us)
+        # Largest distance (m) of a silent vehicle from its extrapolation at constant velocity.
+        self._acceleration_drift = config.limits.a_total * float(
+            further(np.array(1e-6 * config.guard.flown_on_us))
+        )
         self._stale = config.guard.plan_stale_us
-        self._closing = 2.0 * self._fastest
-        self._certainly = float(self._reach(self._closing)) + self._closing * self._ahead
-        self._below = config.guard.landing_clearance + config.field.margin(2)
-        self._all = False
-        self._until: dict[int, int] = {}
+        self._closing = 2.0 * self._max_speed
+        self._relevant_distance = float(self._reach(self._closing)) + self._closing * self._horizon_s
+        self._landing_distance = config.guard.landing_clearance + config.field.margin(2)
+        self._use_all = False
+        self._ignored_until: dict[int, int] = {}
         self.now = 0
         self.use(config.methods)
 
     def use(self, methods: Sequence[MethodName]) -> None:
         """Adapt to the ``methods`` that the planner uses from now on."""
-        self._all = self._config.avoidance == "certified" or "swivel" in methods
-        self._until.clear()
+        self._use_all = self._config.avoidance == "certified" or "swivel" in methods
+        self._ignored_until.clear()
 
     def ignores(self, sender: int) -> bool:
-        """Return whether position and plan messages of this system need not be decoded now."""
-        return self._until.get(sender, 0) > self.now
+        """Return whether position and plan messages of the system ``sender`` need not be decoded now."""
+        return self._ignored_until.get(sender, 0) > self.now
 
     def look(
         self,
@@ -81,54 +90,55 @@ class RelevanceFilter:
         ids: Sequence[int],
         states: Array,
         ages: Ages,
-        familiar: Callable[[], NDArray[np.bool_]],
+        trusted: Callable[[], NDArray[np.bool_]],
     ) -> None:
         """Determine the systems to ignore from ``now`` on.
 
-        ``states`` (M, 6) are the others' last positions (m) and velocities (m/s), fleet-local ENU; ``ages``
-        (M,) in µs. ``familiar`` returns which of them (M,) are trusted; it is called only if there is a
-        candidate.
+        ``own``: the own state; ``ids`` (M), ``states`` (M, 6) and ``ages`` (M,), µs: of the others' last
+        positions (m) and velocities (m/s), fleet-local ENU. ``trusted`` returns which of them (M,) are
+        trusted; it is called only if there is a candidate.
         """
-        self._until.clear()
-        if self._all or own is None or own.age > self._config.guard.own_stale_us or not len(states):
+        self._ignored_until.clear()
+        if self._use_all or own is None or own.age > self._config.guard.own_stale_us or not len(states):
             return
-        if float(np.sqrt(own.velocity @ own.velocity)) > self._fastest:
+        if float(np.sqrt(own.velocity @ own.velocity)) > self._max_speed:
             return
-        apart = norms(states[:, 0:3] - own.position)
-        if apart.max() <= self._certainly:
+        distance = norms(states[:, 0:3] - own.position)
+        if distance.max() <= self._relevant_distance:
             return
         age = 1e-6 * np.maximum(ages, 0)
-        # The own state may be old as well.
-        spare = apart - self._certainly - self._fastest * (age + 1e-6 * max(own.age, 0)) - _OFF_PLAN
-        silence = np.minimum(spare / self._closing - self._silence, self._longest - age)
-        silence[norms(states[:, 3:6]) > self._fastest] = 0.0
-        silent = silence > 0.0
-        if not silent.any():
+        moved = self._max_speed * (age + 1e-6 * max(own.age, 0))
+        spare = distance - self._relevant_distance - moved - _MAX_PLAN_OFFSET
+        ignored_s = np.minimum(spare / self._closing - self._message_gap_s, self._max_age_s - age)
+        ignored_s[norms(states[:, 3:6]) > self._max_speed] = 0.0
+        ignored = ignored_s > 0.0
+        if not ignored.any():
             return
-        until = self.now + (1e6 * silence).astype(np.int64)
-        for row in np.flatnonzero(silent & familiar()).tolist():
-            self._until[ids[row]] = int(until[row])
+        until = self.now + (1e6 * ignored_s).astype(np.int64)
+        for row in np.flatnonzero(ignored & trusted()).tolist():
+            self._ignored_until[ids[row]] = int(until[row])
 
     def near(self, places: Array, states: Array, ages: Ages) -> NDArray[np.bool_]:
         """Return which (M,) of the others can affect a plan that is made now at one of ``places`` (P, 3).
 
-        These are all whose ``states`` (M, 6) of ``ages`` (M,) µs are within the bound with S = P = 0 of one
-        of the places, and those onto which a vehicle that lands there would descend.
+        ``states`` (M, 6) and ``ages`` (M,), µs: the others' last ones. The result contains those within the
+        bound with S = P = 0 of one of the places, and those so near horizontally that a vehicle which lands
+        at a place might descend onto them.
         """
         off = states[:, None, 0:3] - places
-        apart = norms(off).min(axis=1)
-        near: NDArray[np.bool_] = (apart <= self._certainly) | self._all
+        distance = norms(off).min(axis=1)
+        near: NDArray[np.bool_] = (distance <= self._relevant_distance) | self._use_all
         if near.all():
             return near
-        closing = self._fastest + np.maximum(norms(states[:, 3:6]), self._fastest)
-        gone = 1e-6 * np.clip(ages, 0, self._shown) * (closing - self._fastest)
-        gone += self._driven * (ages > self._stale)
-        near = apart <= self._reach(closing) + closing * self._ahead + gone + _OFF_PLAN
-        below = norms(off[:, :, 0:2]).min(axis=1) <= self._below + gone + _OFF_PLAN
+        closing = self._max_speed + np.maximum(norms(states[:, 3:6]), self._max_speed)
+        drift = 1e-6 * np.clip(ages, 0, self._extrapolate_us) * (closing - self._max_speed)
+        drift += self._acceleration_drift * (ages > self._stale)
+        near = distance <= self._reach(closing) + closing * self._horizon_s + drift + _MAX_PLAN_OFFSET
+        below = norms(off[:, :, 0:2]).min(axis=1) <= self._landing_distance + drift + _MAX_PLAN_OFFSET
         return np.asarray(near | below)
 
     def _reach(self, closing: Array | float) -> Array:
-        """Return the distance (m, between centres) at which two vehicles act on each other.
+        """Return the distance (m, between centres) within which one vehicle affects the plan of the other.
 
         ``closing`` (m/s): their closing speed.
         """

@@ -64,7 +64,7 @@ class Sensed:
     def around(self, now: int, prediction: Array, reach: float) -> Axes:
         """Return all sensed obstacles within ``reach`` (m) of some predicted position (n, 3).
 
-        Each is given by its points nearest to these.
+        Each obstacle is given by its points nearest to the predicted positions.
         """
         parts = [
             part.around(now, prediction, reach) for part in (self.proximity, self.traffic) if part is not None
@@ -75,11 +75,11 @@ class Sensed:
         return Axes(sum(ids, ()), np.concatenate(positions), np.concatenate(radii))
 
     def obstacles(self, now: int, prediction: Array, reach: float) -> Obstacles:
-        """Return the same obstacles for the field; ``prediction`` (n, 3) is the own one.
+        """Return the obstacles of ``around`` for the field; ``prediction`` (n, 3): own predicted positions.
 
         Deep inside the keep-out volume of traffic the field would push with the full acceleration of the
-        vehicle, beyond any speed limit. So for the field that volume ends where the push is gentle; ``aside``
-        leads out of it.
+        vehicle, beyond any speed limit. So for the field this volume is made smaller, such that the push is
+        moderate; the goal from ``aside`` leads out of the volume.
         """
         ids, positions, radius = self.around(now, prediction, reach)
         field = self._config.field

@@ -1,7 +1,7 @@
 """Fixed obstacles that every companion is configured with: spheres, and posts on the ground.
 
-For the field and its methods each is a point on its axis (for a sphere: its centre) that is enlarged by
-``radius``. It is the point of the axis nearest to the predicted position, so that the force is horizontal
+For the field and its methods each obstacle is a point on its axis (for a sphere: its centre), enlarged by
+``radius``: the point of the axis nearest to the predicted position, so that the force is horizontal
 beside a post and points up above it.
 """
 
@@ -65,8 +65,8 @@ class FixedObstacles:
 def to_surface(across: Array, above: Array, ball: NDArray[np.bool_], radius: Array) -> Array:
     """Return the distances (…, M), m, of points from the surfaces of spheres and posts; negative inside.
 
-    ``ball`` (M,): which are spheres; ``radius`` (M,), m. The points are ``across`` (…, M) from the axes and
-    ``above`` (…, M) a sphere's centre or a post's top, which is flat.
+    ``ball`` (M,): whether the obstacle is a sphere; ``radius`` (M,), m. The points are ``across`` (…, M) from
+    the axes and ``above`` (…, M) a sphere's centre or a post's top, which is flat.
     """
     beside = across - radius
     outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(above, 0.0) ** 2)

@@ -21,24 +21,24 @@ from mavlink_bridge.messages import AdsbVehicle
 
 FIRST_ID = 1 << 32
 """Ids of traffic begin here: above all others."""
-_FASTEST, _CLIMBS = 350.0, 60.0
-"""m/s; reports beyond these, or beyond ``_HIGHEST`` (m), are rejected as garbage."""
-_HIGHEST = 30_000.0
-_STRAYS = 300.0
-"""m; tolerance on the distance between positions of one address beyond what flying explains.
+_MAX_SPEED, _MAX_CLIMB = 350.0, 60.0
+"""m/s, largest speed and climb rate; reports beyond these or ``_MAX_HEIGHT`` (m) are rejected as invalid."""
+_MAX_HEIGHT = 30_000.0
+_JUMP_TOLERANCE = 300.0
+"""m; tolerance on the distance between two positions of one address, beyond ``_MAX_SPEED`` · interval.
 
-Beyond it they belong to two aircraft, and the first one is kept.
+Positions further apart are attributed to two aircraft, and the first one is kept.
 """
-_HEAD_ON = 1.0
+_SIDE_OFFSET = 1.0
 """m; nearer to the path than this, the side is undefined: the vehicle evades to the aircraft's right."""
 _NEAR = 1e-6
 _EAST = np.array([1.0, 0.0])
-_MOVES = 1.0
+_MIN_PATH_SQUARE = 1.0
 """Least square (m²) of the length of a path that has a direction."""
 
 
 class _Aircraft(NamedTuple):
-    """State at ``when`` (µs): ``place`` (3,) m, its height ± ``half`` (m), and ``velocity`` (3,) m/s."""
+    """State at ``when`` (µs): ``place`` (3,) m, height error ± ``half`` (m), and ``velocity`` (3,) m/s."""
 
     when: int
     place: Array
@@ -65,7 +65,9 @@ class _Path(NamedTuple):
         """Return the path points (n, 3) that are nearest to ``points`` (n, 3), seen from above."""
         off, square = points - self.begin, self.square
         share = (
-            np.zeros(len(off)) if square < _MOVES else np.clip(off[:, :2] @ self.way[:2] / square, 0.0, 1.0)
+            np.zeros(len(off))
+            if square < _MIN_PATH_SQUARE
+            else np.clip(off[:, :2] @ self.way[:2] / square, 0.0, 1.0)
         )
         nearest = self.begin + share[:, None] * self.way
         nearest[:, 2] = np.clip(points[:, 2], nearest[:, 2] - self.half, nearest[:, 2] + self.half)
@@ -73,14 +75,14 @@ class _Path(NamedTuple):
 
     def across(self, side: Array) -> Array:
         """Return a horizontal direction (2,) at a right angle to the path, on the ``side`` (3,), m, of it."""
-        if self.square < _MOVES:
+        if self.square < _MIN_PATH_SQUARE:
             return side[:2] if hypot(side[0], side[1]) > _NEAR else _EAST
         left = np.array([-self.way[1], self.way[0]])
         return left if left @ side[:2] >= 0.0 else -left
 
 
 class Traffic:
-    """All received aircraft, by address; ``refused`` counts messages that were invalid or out of range."""
+    """All received aircraft, by address; ``refused`` counts all messages that were not accepted."""
 
     def __init__(self, config: TrafficConfig) -> None:
         self._config = config
@@ -117,7 +119,7 @@ class Traffic:
         return Axes(tuple(ids), places, np.full(len(ids), self._config.radius))
 
     def outside(self, now: int, goal: Array, here: Array, clearance: float) -> Array:
-        """Return the ``goal`` (3,), or a place of the same height beside the paths that it lies on.
+        """Return the ``goal`` (3,), or a place of the same height beside the paths on which the goal lies.
 
         That place is ``clearance`` (m) outside their keep-out volumes, if possible on the vehicle's side: the
         vehicle flies there, and is not pushed by the field.
@@ -144,9 +146,9 @@ class Traffic:
     def _take(self, now: int, message: AdsbVehicle, place: Array, here: Array) -> bool:
         speed, climb = message.speed or 0.0, message.climb or 0.0
         off = place[:2] - here[:2]
-        if message.address >= _ADDRESSES or speed > _FASTEST or abs(climb) > _CLIMBS:
+        if message.address >= _ADDRESSES or speed > _MAX_SPEED or abs(climb) > _MAX_CLIMB:
             return False
-        if message.age > self._config.age_us or not abs(place[2]) <= _HIGHEST:
+        if message.age > self._config.age_us or not abs(place[2]) <= _MAX_HEIGHT:
             return False
         if not float(off @ off) <= self._config.reach**2:
             return False
@@ -157,7 +159,7 @@ class Traffic:
         before = self._received.get(message.address)
         if before is not None:
             moved = place[:2] - before.place[:2]
-            explained = _STRAYS + _FASTEST * 1e-6 * abs(one.when - before.when)
+            explained = _JUMP_TOLERANCE + _MAX_SPEED * 1e-6 * abs(one.when - before.when)
             if one.when < before.when or float(moved @ moved) > explained**2:
                 return False
         elif len(self._received) >= self._config.most and not self._make_room(off, here):
@@ -185,16 +187,17 @@ class Traffic:
     def _nearest(self, now: int, one: _Aircraft, prediction: Array) -> Array:
         """Return the path points (n, 3) that are nearest to ``prediction`` (n, 3), seen from above.
 
-        A prediction on the path has a point beside it instead, to which the field has a direction.
+        For a prediction within 1 m of the path, the point is set 1 m beside the prediction, so that the field
+        has a direction.
         """
         path = self._path(now, one)
         nearest = path.nearest(prediction)
         aside = prediction - nearest
-        level = np.abs(aside[:, 2]) < _HEAD_ON
-        head_on = level & (np.vecdot(aside[:, :2], aside[:, :2]) < _HEAD_ON**2)
-        if path.square >= _MOVES and head_on.any():
+        level = np.abs(aside[:, 2]) < _SIDE_OFFSET
+        head_on = level & (np.vecdot(aside[:, :2], aside[:, :2]) < _SIDE_OFFSET**2)
+        if path.square >= _MIN_PATH_SQUARE and head_on.any():
             left = np.array([-path.way[1], path.way[0], 0.0]) / np.sqrt(path.square)
-            nearest[head_on] = prediction[head_on] + _HEAD_ON * left
+            nearest[head_on] = prediction[head_on] + _SIDE_OFFSET * left
         return nearest
 
     def _forget(self, now: int) -> None:

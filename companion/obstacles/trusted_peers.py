@@ -1,8 +1,8 @@
-"""Neighbours whose reported position is trusted for a moment.
+"""Trusted neighbours: the relevance filter may ignore their messages for a short time.
 
-A trusted neighbour shares a plan, is where the plan says, and has not contradicted itself for a while. A
-vehicle with contradictory reports, caused by a receiver that jumps or by another sender with its id, may be
-at either place; and one that shares no plan is not bound by any known limits.
+A trusted neighbour shares a plan, is at most 1 m from it, and its track has accepted all measurements for 3
+s. A vehicle with contradictory reports, caused by a position that jumps or by another sender with its id, may
+be at either position; and a vehicle that shares no plan is not bound by any known limits.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from companion.estimation.tracks import Track
 from companion.values.horizon import Array, Located
 
-_STEADY = 3_000_000
-"""µs for which a track must have accepted all measurements."""
-_FRESH = 2_000_000
+_CONSISTENT_US = 3_000_000
+"""µs for which a track must have accepted all measurements of a trusted neighbour."""
+_MAX_PLAN_AGE_US = 2_000_000
 """µs by which a plan may be older than its sender's last state."""
-_BESIDE = 1.0
-"""m by which the plan may pass beside that state."""
+_MAX_PLAN_OFFSET = 1.0
+"""m between the plan and that state, at most."""
 
 
 class _Record(NamedTuple):
@@ -38,8 +38,8 @@ class TrustedPeers:
     def note(self, now: int, row: int, track: Track) -> None:
         """Record that a message of the vehicle of ``row`` was received at ``now`` (µs).
 
-        ``row`` is an existing one or the next one. It must be called for every message that was given to the
-        track; otherwise a refused or doubted measurement is missed.
+        ``row`` is an existing one or the next one. This must be called for every message that was given to
+        the track; otherwise a refused or doubted measurement is missed.
         """
         record = _Record(track, track.refused)
         if row == len(self._records):
@@ -54,9 +54,13 @@ class TrustedPeers:
     def trusted(self, now: int, states: Array, plans: Located) -> NDArray[np.bool_]:
         """Return which neighbours (M,) are trusted at ``now`` (µs).
 
-        ``states`` (M, 6): their last states; ``plans``: each one's planned position at the time of that
-        state.
+        ``states`` (M, 6): their last states; ``plans``: the position that each neighbour had planned for the
+        time of its last state.
         """
         off = plans.positions - states[:, 0:3]
-        there = (plans.after >= -plans.dt) & (plans.after <= _FRESH) & (np.vecdot(off, off) <= _BESIDE**2)
-        return np.asarray(there & (now - self._since >= _STEADY))
+        there = (
+            (plans.after >= -plans.dt)
+            & (plans.after <= _MAX_PLAN_AGE_US)
+            & (np.vecdot(off, off) <= _MAX_PLAN_OFFSET**2)
+        )
+        return np.asarray(there & (now - self._since >= _CONSISTENT_US))

@@ -21,8 +21,8 @@ class Tally(NamedTuple):
 
     ``plans`` that were made, and how many of them with ``relaxed`` bounds; ``solver_failures``; ``held``: how
     often an old plan was kept; ``anchored_anew``: how often planning restarted at the measured position.
-    ``plan_ns``: one stopwatch reading (ns) per attempt to plan, at most 4.29 s. ``plan_at``: time (µs on the
-    companion's clock) of the step that made the attempt.
+    ``plan_ns``: stopwatch reading (ns) of each attempt to plan, clipped to 4.29 s. ``plan_at``: time (µs on
+    the companion's clock) of the step that made the attempt.
     """
 
     plans: int
@@ -38,8 +38,8 @@ class AvoidanceInputs(NamedTuple):
     """Inputs of one step of avoidance.
 
     ``measured``: the own motion, its velocity clipped to the limits; ``stale``: whether it is too old to plan
-    from; ``aim``: function that returns the aim of a plan made now, None if the surface has no nearest point.
-    It is to be called once in a step at most, because it may end a phase of the flight.
+    from; ``aim``: function that returns the aim of a plan made now, None if a user's surface fails. Call it
+    once in a step at most, because it may end a phase of the flight.
     """
 
     view: View
@@ -71,7 +71,7 @@ class Avoidance(Protocol):
 
     @property
     def failing(self) -> int | None:
-        """Time (µs) of the first of the present failures of the solver; None if it succeeded last."""
+        """Time (µs) at which the solver began to fail; None if its last attempt succeeded."""
         ...
 
     @property

@@ -82,7 +82,7 @@ class CertifiedAvoidance:
         self.horizon = None
 
     def rest(self) -> None:
-        """Discard what is flown, because set-points do not steer the vehicle."""
+        """Discard the horizon that is flown, because set-points do not steer the vehicle."""
         self.horizon = None
 
     def fly(self, now: int, situation: AvoidanceInputs) -> Array | None:
@@ -124,7 +124,7 @@ class CertifiedAvoidance:
         return None
 
     def _replan(self, now: int, situation: AvoidanceInputs) -> None:
-        """Make the next epoch's plan, or extend the committed plan by one epoch."""
+        """Make the next epoch's plan: by solving, from the measured motion, or by carrying the old one on."""
         flight, started = self._flight, self._times.stopwatch()
         aim = None if situation.stale else situation.aim()
         if aim is None:

@@ -57,7 +57,7 @@ class FieldAvoidance:
 
     @property
     def failing(self) -> int | None:
-        """Time (µs) since which the solver finds no plan; None while it does."""
+        """Time (µs) at which the solver began to fail; None if its last attempt succeeded."""
         return self.guard.failing
 
     @property
@@ -103,7 +103,7 @@ class FieldAvoidance:
         self.guard.horizon = None
 
     def rest(self) -> None:
-        """Discard what is flown and observed, because set-points do not steer the vehicle."""
+        """Discard the horizon and the state of tracking, because set-points do not steer the vehicle."""
         self.guard.rest()
         self.tracking.reset()
 
@@ -134,18 +134,18 @@ class FieldAvoidance:
         return now < self.next_due
 
     def receive(self, now: int, link: str, message: Message) -> bool:
-        """Return False: the world picture processes all messages."""
+        """Return False: the world picture receives all messages."""
         return False
 
     def messages(self, now: int, *, farewell: bool) -> list[Message]:
-        """Send no messages of its own."""
+        """Return no messages: the field has none of its own."""
         return []
 
     def shared(self, now: int, view: View) -> Horizon | None:
         """Return the horizon to share with the neighbours; None if nothing is flown.
 
-        A vehicle that shares a surface with others takes part from its climb on, with its present velocity.
-        Otherwise the others would choose their places without it, and change them later.
+        Exception: a vehicle that shares a surface with others shares its present position and velocity from
+        its climb on. Otherwise the others would choose their places without it, and change them later.
         """
         if self.guard.horizon is not None:
             return self.guard.horizon
@@ -165,7 +165,7 @@ class FieldAvoidance:
             self.tracking.observe(now, sent, measured, loop)
 
     def _replan(self, now: int, situation: AvoidanceInputs, aim: Aim) -> Array | None:
-        """Make a plan towards ``aim``; without a solution keep the old one."""
+        """Make a plan towards ``aim``; return its positions (N + 1, 3), m, or None if the old one is kept."""
         horizon, config = self.guard.horizon, self._config.horizon
         state = self.guard.anchor(now, situation.measured)
         started = self._times.stopwatch()

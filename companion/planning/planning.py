@@ -23,16 +23,16 @@ from mavlink_bridge.frames import LocalFrame
 
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
-_NOBODY = np.empty((0, 3))
-_NOBODY.flags.writeable = False
+_NO_POSITIONS = np.empty((0, 3))
+_NO_POSITIONS.flags.writeable = False
 _NO_OBSTACLES = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
 
 
 class Planning:
     """Planning of one vehicle by ``avoidance``.
 
-    ``world`` holds what is known of the surroundings, ``goals`` gives the destination, and ``pilot`` reports
-    whether the companion controls the vehicle.
+    ``world`` gives the obstacles, ``goals`` the destination, and ``pilot`` reports whether the companion
+    controls the vehicle.
     """
 
     def __init__(
@@ -99,15 +99,14 @@ class Planning:
         self._heading.plan(now, places, view.target.ahead(ahead).positions)
 
     def _aim(self, now: int, view: View, measured: Motion, *, cautious: bool) -> Aim | None:
-        """Return the aim of the next plan; None if the surface has no nearest point."""
+        """Return the aim of the next plan; None if the function of a user's surface fails."""
         obstacles = _NO_OBSTACLES
         if self._pilot.phase is Phase.SETTLE:
-            # Use the others' present positions: a vehicle that has just begun to steer has not yet planned
-            # with regard to them.
+            # The vehicle settles near its measured position: obstacles near this position are needed.
             here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
             obstacles = self._world.obstacles(now, view, here)
         try:
-            mates = self._world.neighbours.mates(now) if self._config.shares_surface else _NOBODY
+            mates = self._world.neighbours.mates(now) if self._config.shares_surface else _NO_POSITIONS
             below = self._world.neighbours.below if self._config.guard.return_step else 0
             aim = self._goals.aim(now, view, measured, obstacles, mates, below, cautious=cautious)
         except SurfaceError:

@@ -32,7 +32,8 @@ class Setpoints:
     def due(self, now: int, view: View) -> list[Message]:
         """Return the set-point if one is due at ``now`` (µs), otherwise an empty list.
 
-        There is none without a horizon, a known autopilot and a local frame, or while nothing is steered.
+        No set-point is sent without a horizon, a known autopilot and a local frame, while nothing is steered,
+        or if it is not finite.
         """
         if now < self.next_due:
             return []
@@ -56,7 +57,7 @@ class Setpoints:
             tracking.lead(self._pilot.loop),
         )
         if not is_finite(message):
-            # It is not sent. Its horizon is discarded, and planning restarts at the measured position.
+            # The horizon is discarded, so planning restarts at the measured position.
             self.not_finite += 1
             self._avoidance.discard()
             return []

@@ -1,9 +1,9 @@
 """Destination surfaces around a target: takes offsets from the target, gives the surface's nearest points.
 
-The paper allows any of them (Sec. IV-A: "our approach can attain any desired 3D destination surface"). A
+The paper allows any surface (Sec. IV-A: "our approach can attain any desired 3D destination surface"). A
 surface is a set of offsets from the target, fleet-local ENU, m. The destination is its point nearest to the
 vehicle, x̌ = x_P + nearest(x_R − x_P); for the paper's circle that is the paper's formula (Sec. III-B). The
-configuration sets kind and size, for each vehicle if needed.
+configuration sets kind and size, for all vehicles or for each one.
 """
 
 from __future__ import annotations

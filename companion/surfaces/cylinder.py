@@ -21,13 +21,13 @@ class Cylinder(Settings):
     high: float = Field(8.0, ge=-50.0, le=100.0, description="m above the target")
 
     @model_validator(mode="after")
-    def _open(self) -> Cylinder:
+    def _check_heights(self) -> Cylinder:
         if self.low >= self.high:
             raise ValueError("low must lie below high")
         return self
 
     def nearest(self, offset: Array) -> Array:
-        """Return the points straight outward at the same height, clipped to the cylinder's heights."""
+        """Return the points horizontally outward at the same height, clipped to the cylinder's heights."""
         result = np.empty(offset.shape)
         result[..., 0], result[..., 1] = outward(offset, self.radius)
         result[..., 2] = np.clip(offset[..., 2], self.low, self.high)

@@ -24,7 +24,7 @@ class Ellipsoid(Settings):
     height: float = Field(6.0, ge=-50.0, le=200.0, description="of the centre, m above the target")
 
     def nearest(self, offset: Array) -> Array:
-        """Return the foot of the perpendicular, from inside or outside.
+        """Return the nearest points, the feet of the perpendiculars, from inside or outside.
 
         With y the point from the centre and e the semi-axes, the foot is x_i = e_i² y_i/(t + e_i²), where t
         is the largest root of Σ (e_i y_i/(t + e_i²))² = 1. The root lies above −min e² and the sum decreases

@@ -11,7 +11,7 @@ from companion.surfaces.circle import outward, ring
 from companion.values.horizon import Array
 from companion.values.settings import Settings
 
-_NEAR = 1e-9
+_MIN_DISTANCE_M = 1e-9
 
 
 class Sphere(Settings):
@@ -23,20 +23,23 @@ class Sphere(Settings):
     lowest: float = Field(3.0, ge=-150.0, le=200.0, description="m above the target: no lower")
 
     @model_validator(mode="after")
-    def _open(self) -> Sphere:
+    def _check_heights(self) -> Sphere:
         if self.lowest >= self.height + self.radius:
             raise ValueError(f"lowest must lie below the sphere's top, {self.height + self.radius:g}")
         return self
 
     def nearest(self, offset: Array) -> Array:
-        """Return the points in the direction from the centre.
+        """Return the points in the direction of ``offset`` from the centre.
 
-        Where that point is below ``lowest``, it is the one on the circle at that height.
+        A point below ``lowest`` is replaced by the nearest point of the circle at that height. For an offset
+        at the centre itself it is the top.
         """
         away = offset - (0.0, 0.0, self.height)
         distance = np.linalg.norm(away, axis=-1, keepdims=True)
         # From the centre all points are equally near; straight up is free of other vehicles.
-        away = np.where(distance < _NEAR, (0.0, 0.0, 1.0), away / np.maximum(distance, _NEAR))
+        away = np.where(
+            distance < _MIN_DISTANCE_M, (0.0, 0.0, 1.0), away / np.maximum(distance, _MIN_DISTANCE_M)
+        )
         result: Array = self.radius * away
         result[..., 2] += self.height
         low = result[..., 2] < self.lowest
@@ -44,7 +47,7 @@ class Sphere(Settings):
             result[..., 0], result[..., 1] = (
                 np.where(low, edge, inner)
                 for edge, inner in zip(
-                    outward(offset, self._edge), (result[..., 0], result[..., 1]), strict=True
+                    outward(offset, self._lowest_radius), (result[..., 0], result[..., 1]), strict=True
                 )
             )
             result[..., 2] = np.maximum(result[..., 2], self.lowest)
@@ -56,6 +59,6 @@ class Sphere(Settings):
         return ring(float(np.sqrt(self.radius**2 - (low - self.height) ** 2)), low)
 
     @property
-    def _edge(self) -> float:
+    def _lowest_radius(self) -> float:
         """Radius (m) of the circle at ``lowest``."""
         return float(np.sqrt(max(0.0, self.radius**2 - (self.lowest - self.height) ** 2)))

@@ -1,1 +1,1 @@
-"""Turns the companion's state into messages for neighbours and ground, and filters received messages."""
+"""Messages of the companion's state for neighbours and ground, and filters of received messages."""

@@ -12,8 +12,8 @@ class Metrics:
     """Metrics of the companion ``own``.
 
     ``plan_ms``: the longest planning time since the last report; ``misses``: total number of plans that took
-    longer than their period; ``held``: total number of times that an old plan was kept; ``target_s``: age of
-    the last measurement of the target, absent before the first.
+    longer than their period; ``held``: total number of times that an old plan was kept; ``target_s``: age (s)
+    of the target's state, absent before the first.
     """
 
     def __init__(self, config: CompanionConfig, own: Source) -> None:
@@ -27,7 +27,7 @@ class Metrics:
         self._longest: int | None = None
 
     def note(self, plan_ns: int) -> None:
-        """Record the time ``plan_ns`` (ns) that a plan took."""
+        """Record the computing time ``plan_ns`` (ns) of a plan."""
         self._longest = max(self._longest or 0, plan_ns)
         self._misses += plan_ns > self._period_ns
 

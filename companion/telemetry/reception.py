@@ -9,9 +9,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.config import CompanionConfig
 from companion.config.target_source import CameraSource, message_of, sender_of
 
-_WHERE = {mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mavlink.MAVLINK_MSG_ID_TUNNEL}
-"""Messages with a neighbour's position and plan: not decoded while the relevance filter ignores it."""
-_WANTED = {
+_POSITION_AND_PLAN = {mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mavlink.MAVLINK_MSG_ID_TUNNEL}
+"""Messages with a neighbour's position and plan; dropped while the relevance filter ignores their sender."""
+_ACCEPTED_IDS = {
     "autopilot": {
         mavlink.MAVLINK_MSG_ID_HEARTBEAT,
         mavlink.MAVLINK_MSG_ID_SYS_STATUS,
@@ -44,19 +44,20 @@ def accepts(
     config: CompanionConfig,
     ignores: Callable[[int, int], bool] = lambda _sender, _component: False,
 ) -> Callable[[int, int, int], bool]:
-    """Return the header filter of a link of the companion of ``system``.
+    """Return the header filter of ``link`` for the companion of ``system``.
 
-    It takes message id, sender and component, and returns whether the message is wanted there and may come
-    from that sender. ``target`` is the system id of the target. ``ignores`` takes sender and component on the
-    swarm link and returns whether their positions and plans are to be ignored.
+    The filter takes message id, sender and component, and returns whether this link accepts the message from
+    this sender. ``target`` is the system id of the target. ``ignores`` takes sender and component of a
+    message on the swarm link and returns whether positions and plans of this sender are to be dropped. The
+    filter of an unknown link accepts nothing.
     """
-    wanted = _WANTED.get(link, set())
+    wanted = _ACCEPTED_IDS.get(link, set())
     if link == "autopilot" and config.limits_from_autopilot:
         wanted = wanted | {mavlink.MAVLINK_MSG_ID_PARAM_VALUE}
     source = config.target_source
     distances = {mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE} if config.proximity is not None else set()
     traffic = {mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE} if config.traffic is not None else set()
-    # Sensors of the own system may send on both links.
+    # Sensors of the own system may send on the autopilot link and on the swarm link.
     sensors = distances | traffic
     reported, target_sender = message_of(source), sender_of(source, system, target)
     if link == "autopilot":
@@ -71,13 +72,13 @@ def accepts(
             identifier == reported and (target_sender is None or sender == target_sender)
         )
     if link == "swarm":
-        # Traffic may come from any sender.
+        # ADSB_VEHICLE may come from any sender on the swarm link, not only from the own system.
         wanted = wanted | traffic
         return lambda identifier, sender, component: (
             (
                 identifier in wanted
                 and sender != system
-                and not (identifier in _WHERE and ignores(sender, component))
+                and not (identifier in _POSITION_AND_PLAN and ignores(sender, component))
             )
             or (identifier in sensors and sender == system)
         )

@@ -1,4 +1,4 @@
-"""Messages to the others: position and horizon on the swarm link, a heartbeat on both links.
+"""Messages to the others: position and horizon on the swarm link, a heartbeat also to the autopilot.
 
 The position (GLOBAL_POSITION_INT) is always sent in addition to the horizon, because every MAVLink receiver
 understands it.
@@ -21,8 +21,8 @@ from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 from mavlink_bridge.wire.uncertainty import pack as pack_doubt
 
 _SECOND = 1_000_000
-_TAKES_BACK = 3_000_000
-"""µs after the last position uncertainty during which an uncertainty of 0 is sent."""
+_CLEAR_US = 3_000_000
+"""µs after the last position uncertainty above 0 during which 0 is sent, to end the report."""
 
 
 def onboard_heartbeat(own: Source) -> Heartbeat:
@@ -32,14 +32,14 @@ def onboard_heartbeat(own: Source) -> Heartbeat:
 
 
 class Shared(NamedTuple):
-    """Messages by link."""
+    """Messages to send, by link."""
 
     autopilot: list[Message]
     swarm: list[Message]
 
 
 class Sharing:
-    """Sends each kind of message at its own period."""
+    """Creates the messages to share; each kind has its own period."""
 
     def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
         self._config = config
@@ -51,14 +51,14 @@ class Sharing:
 
     @property
     def next_due(self) -> int:
-        """Time (µs) at which the next message is due."""
+        """Time (µs) at which the next message may be due; 0 before the first call of ``due``."""
         return min(self._next)
 
     def due(self, now: int, view: View, horizon: Horizon | None, doubt: float = 0.0) -> Shared:
         """Return the messages that are due at ``now`` (µs).
 
-        ``horizon`` is the flown one; without it none is sent. ``doubt``: how far (m) the vehicle may be from
-        its reported position.
+        ``horizon``: the flown one; without it, or without ``shares_plan``, no plan is sent. A position is
+        sent only while the own state is fresh. ``doubt``: how far (m) the vehicle may be from that position.
         """
         if self._boot is None:
             self._boot = now
@@ -74,7 +74,7 @@ class Sharing:
             shared.swarm.append(self._position(now - self._boot, view))
             if doubt > 0.0:
                 self._doubted = now
-            if self._doubted is not None and now - self._doubted <= _TAKES_BACK:
+            if self._doubted is not None and now - self._doubted <= _CLEAR_US:
                 # GLOBAL_POSITION_INT has no field for the uncertainty.
                 shared.swarm.append(Tunnel(self._own, 0, 0, DOUBT, pack_doubt(doubt)))
         if self._passes(2, now, rates.plan_us) and horizon is not None and self._config.shares_plan:
@@ -113,7 +113,7 @@ def position_message(
 def plan_message(horizon: Horizon, source: Source, fleet: FleetFrame) -> Tunnel | None:
     """Return the TUNNEL message of ``source`` with this horizon.
 
-    Returns None for a horizon that does not fit the wire format; neighbours then receive the position alone.
+    Returns None if the horizon does not fit the wire format; neighbours then receive the position alone.
     """
     knots = horizon.knots
     try:

@@ -1,4 +1,4 @@
-"""Status texts for the ground (STATUSTEXT): each event once, at a bounded rate."""
+"""Status texts for the ground (STATUSTEXT), at a bounded rate."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.config.flight import GroundMessagesConfig
 from mavlink_bridge.messages import Source, StatusText
 
-_EVERY, _AT_ONCE = 1_000_000, 5
+_PERIOD_US, _BURST = 1_000_000, 5
 """µs per text, and the number of texts that may be sent at once after a pause."""
-_WAITING = 16
+_MAX_WAITING = 16
 """Maximum number of waiting texts; beyond that the least severe is dropped."""
 
 
@@ -43,15 +43,16 @@ class StatusReporter:
         if not self._on or any(text == one for _, one in self._waiting):
             return
         self._waiting.append((severity, text))
-        if len(self._waiting) > _WAITING:
-            # The youngest of the least severe.
+        if len(self._waiting) > _MAX_WAITING:
+            # Drop the youngest of the least severe texts.
             worst = max(range(len(self._waiting)), key=lambda row: (self._waiting[row][0], row))
             del self._waiting[worst]
 
     def watch(self, wrong: bool, lost: str, back: str, severity: Severity = Severity.WARNING) -> None:
-        """Report the beginning (``lost``) and the end (``back``) of a condition that may be ``wrong``.
+        """Report the begin of a condition by the text ``lost``, and its end by ``back``.
 
-        ``lost`` identifies the condition. Repeated calls with the same state have no effect.
+        ``wrong``: whether the condition is present; ``severity``: of its begin. ``lost`` identifies the
+        condition. Repeated calls with the same state have no effect.
         """
         if wrong == (lost in self._wrong):
             return
@@ -63,7 +64,7 @@ class StatusReporter:
             self.say(Severity.NOTICE, back)
 
     def report(self, severity: Severity, text: str, *, begins: bool) -> None:
-        """Report an event that begins, or its end: "Over:" and the text before its colon."""
+        """Report an event by ``text``, or its end by "Over:" and the part of ``text`` before the colon."""
         if begins:
             self.say(severity, text)
         else:
@@ -72,8 +73,8 @@ class StatusReporter:
     def due(self, now: int) -> list[StatusText]:
         """Return the texts that may be sent at ``now`` (µs), the most severe first."""
         said = []
-        while self._waiting and self._next - now <= (_AT_ONCE - 1) * _EVERY:
-            self._next = max(self._next, now) + _EVERY
+        while self._waiting and self._next - now <= (_BURST - 1) * _PERIOD_US:
+            self._next = max(self._next, now) + _PERIOD_US
             first = min(range(len(self._waiting)), key=lambda row: (self._waiting[row][0], row))
             severity, text = self._waiting.pop(first)
             said.append(StatusText(self._own, severity, text))

@@ -55,7 +55,7 @@ class Horizon(NamedTuple):
     def positions(self, start: int, steps: int, dt: int) -> Array:
         """Return positions (steps, 3), m, at ``start + n·dt``, n = 0…steps − 1.
 
-        ``start`` (µs) must not lie before the first knot.
+        ``start`` (µs) must not lie before the first knot; ``steps`` is at most 64.
         """
         elapsed = (start - self.epoch) + dt * _COUNT[:steps]
         index = np.minimum(elapsed // self.dt, len(self.knots) - 1)
@@ -68,7 +68,7 @@ class Horizon(NamedTuple):
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
 _COUNT = np.arange(64)
-_NEVER = 1 << 62
+_NO_PLAN_US = 1 << 62
 
 
 def roll_out(epoch: int, dt: int, position: Array, velocity: Array, accelerations: Array) -> Horizon:
@@ -86,8 +86,8 @@ def roll_out(epoch: int, dt: int, position: Array, velocity: Array, acceleration
 class Located(NamedTuple):
     """Positions of M plans, each at a time of its own.
 
-    ``positions`` (M, 3), m. ``after`` (M,): that time minus the plan's epoch, µs; larger than any plan's age
-    where there is no plan. ``dt`` (M,): the plan's step, µs.
+    ``positions`` (M, 3), m. ``after`` (M,): that time minus the plan's epoch, µs. ``dt`` (M,): the plan's
+    step, µs. For a sender without a plan, ``after`` is larger than any plan's age and the rest is undefined.
     """
 
     positions: Array
@@ -98,9 +98,9 @@ class Located(NamedTuple):
 class HorizonTable:
     """Latest horizon of each of many senders, sampled together.
 
-    It gives ``steps`` positions at ``dt`` (µs) from any time, or one position of each at a time of its own.
-    Horizons are aligned by time, not by index: the original implementation shared horizons without time
-    stamps and never detected their age.
+    It gives ``steps`` positions of each sender, ``dt`` (µs) apart, from any time on, or one position of each
+    at a time of its own. Horizons are aligned by time, not by index: the paper's implementation shared
+    horizons without time stamps and never detected their age.
     """
 
     def __init__(self, steps: int, dt: int) -> None:
@@ -116,7 +116,7 @@ class HorizonTable:
         self._ahead = dt * np.arange(steps)
 
     def put(self, sender: int, horizon: Horizon) -> None:
-        """Store ``horizon`` unless a later one of the same sender is known."""
+        """Store ``horizon`` unless one of the same sender with a later epoch is known."""
         last = self._latest.get(sender)
         if last is None or horizon.epoch >= last.epoch:
             self._latest[sender] = horizon
@@ -148,7 +148,7 @@ class HorizonTable:
     def positions(self, senders: Sequence[int], start: int, oldest: int) -> tuple[Array, NDArray[np.bool_]]:
         """Return positions (M, steps, 3), m, of ``senders`` at ``start + n·dt``, and a mask (M,).
 
-        The mask is true for horizons made at ``oldest`` (µs) or later; the other rows mean nothing.
+        The mask is true for horizons whose epoch is ``oldest`` (µs) or later; the other rows are undefined.
         """
         rows = self._rows_of(senders)
         if not self._rows:
@@ -158,28 +158,28 @@ class HorizonTable:
         return self._sampled(rows, (start - epochs)[:, None] + self._ahead), known
 
     def at(self, senders: Sequence[int], times: NDArray[np.int64]) -> Located:
-        """Return the positions of ``senders`` (M,) by their plans, each at its own of ``times`` (M,), µs."""
+        """Return the planned position of each of ``senders`` (M,) at the corresponding ``times`` (M,), µs."""
         rows = self._rows_of(senders)
         if not self._rows:
-            none = np.full(len(senders), _NEVER)
+            none = np.full(len(senders), _NO_PLAN_US)
             return Located(np.zeros((len(senders), 3)), none, np.zeros_like(none))
         after = times - self._epochs[rows]
         positions = self._sampled(rows, after[:, None])[:, 0]
-        return Located(positions, np.where(rows >= 0, after, _NEVER), self._dts[rows])
+        return Located(positions, np.where(rows >= 0, after, _NO_PLAN_US), self._dts[rows])
 
     def accelerations(self, senders: Sequence[int], times: NDArray[np.int64]) -> Array:
         """Return the planned accelerations (M, 3), m/s², of ``senders`` (M,).
 
-        Each is taken at its own of ``times`` (M,), µs. They are zero after the plan and without one. Before
-        the plan they are those of its beginning: a plan comes with the state that it begins at, and that
-        state may be dated slightly earlier.
+        They are those at the corresponding ``times`` (M,), µs. Each is zero after the plan and without a
+        plan. Before the plan it is that of the plan's first segment: the measured state that comes with a
+        plan may be dated slightly earlier.
         """
         rows = self._rows_of(senders)
         if not self._rows:
             return np.zeros((len(senders), 3))
         elapsed = times - self._epochs[rows]
-        meant: Array = self._knots[rows, self._segments(rows, elapsed[:, None])[:, 0], 6:9]
-        return np.where((rows >= 0)[:, None], meant, 0.0)
+        planned: Array = self._knots[rows, self._segments(rows, elapsed[:, None])[:, 0], 6:9]
+        return np.where((rows >= 0)[:, None], planned, 0.0)
 
     def _rows_of(self, senders: Sequence[int]) -> NDArray[np.int64]:
         """Return the row of each sender (M,); −1 for those without a horizon."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from companion.values.horizon import Array
 
-_VEHICLES = np.zeros(1)
-_VEHICLES.flags.writeable = False
+_NO_EXTRA_RADIUS = np.zeros(1)
+_NO_EXTRA_RADIUS.flags.writeable = False
 
 
 class Obstacles(NamedTuple):
@@ -25,7 +25,7 @@ class Obstacles(NamedTuple):
     positions: Array
     d_min: Array
     d_safe: Array
-    radius: Array = _VEHICLES
+    radius: Array = _NO_EXTRA_RADIUS
 
     def joined(self, others: Obstacles) -> Obstacles:
         """Return these obstacles and ``others`` together."""
@@ -40,16 +40,17 @@ class Obstacles(NamedTuple):
         )
 
     def shared(self, systems: Collection[int], spacing: float) -> Obstacles:
-        """Return the obstacles such that those of ``systems`` cease to repel at ``spacing`` (m).
+        """Return the obstacles with d_safe of those of ``systems`` lowered to ``spacing`` (m).
 
-        ``spacing`` is the distance that they and the own vehicle shall keep.
+        ``spacing`` is the distance that they and the own vehicle shall keep. d_safe is not raised, and not
+        lowered to less than 1 m above d_min.
         """
         if not any(id_ in systems for id_ in self.ids):
             return self
-        theirs = np.array([id_ in systems for id_ in self.ids])
-        nearest = np.maximum(self.d_min + _WIDTH, spacing)
-        return self._replace(d_safe=np.where(theirs, np.minimum(self.d_safe, nearest), self.d_safe))
+        selected = np.array([id_ in systems for id_ in self.ids])
+        lowered = np.maximum(self.d_min + _MIN_WIDTH_M, spacing)
+        return self._replace(d_safe=np.where(selected, np.minimum(self.d_safe, lowered), self.d_safe))
 
 
-_WIDTH = 1.0
+_MIN_WIDTH_M = 1.0
 """Least difference (m) kept between d_min and d_safe."""

@@ -10,7 +10,7 @@ Positive = Annotated[float, Field(gt=0.0, le=1e4)]
 WireStep = Annotated[int, Field(gt=0, le=262_140, multiple_of=4)]
 """Time between the knots of a plan that fits the wire, µs.
 
-It is a type of its own: a bound given in addition to one that a type already has is ignored.
+It is not derived from another constrained type, because pydantic ignores a second bound of the same kind.
 """
 
 

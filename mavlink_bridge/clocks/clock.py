@@ -1,6 +1,6 @@
 """Sources of the current time in integer µs, simulated or real.
 
-Only the loop that runs nodes reads a clock; nodes receive the time as an argument.
+Loops and links read a clock; nodes receive the time as an argument.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class Clock(Protocol):
         ...
 
     def wait_until(self, instant: int) -> None:
-        """Return when ``now() >= instant``; at once if that is past."""
+        """Block until ``now() >= instant``; return at once if ``instant`` (µs) is past."""
         ...
 
 
@@ -30,7 +30,7 @@ class SimulatedClock:
         self._now = start
 
     def now(self) -> int:
-        """Return the instant last waited for, µs."""
+        """Return the latest instant waited for, or the start, µs."""
         return self._now
 
     def wait_until(self, instant: int) -> None:
@@ -43,8 +43,8 @@ class WallClock:
 
     A correction of the host's time therefore causes no jump.
 
-    With the ``offset_ns`` of another WallClock of this host the two agree exactly, across processes too,
-    because the monotonic clock is the same for all. A different ``offset_ns`` puts time 0 elsewhere.
+    Two WallClocks of one host with the same ``offset_ns`` agree exactly, also in different processes, because
+    they share the monotonic clock. Any other ``offset_ns`` moves time 0 away from the Unix epoch.
     """
 
     def __init__(self, offset_ns: int | None = None) -> None:
@@ -52,84 +52,83 @@ class WallClock:
         """This clock minus the monotonic clock, ns."""
 
     def now(self) -> int:
-        """Return Unix time, µs."""
+        """Return Unix time (time since 0 of this clock, with a given ``offset_ns``), µs."""
         return (time.monotonic_ns() + self.offset_ns) // 1000
 
     def wait_until(self, instant: int) -> None:
         """Sleep until ``instant`` (Unix µs), without spinning.
 
-        Spinning would take time from others on a shared machine. ``time.sleep`` waits for an absolute
-        instant, so that the time spent before it begins is no delay.
+        Spinning would take CPU time from other processes. ``time.sleep`` converts the duration to an absolute
+        instant at once, so that a preemption within the call does not prolong the sleep.
         """
         while (left := instant - self.now()) > 0:
             time.sleep(left * 1e-6)
 
 
 class LostTime(Protocol):
-    """Shared record of the simulated time that is given up: ``lost``, µs.
+    """Account of the simulated time that was given up: ``lost``, µs.
 
-    All clocks that show the same time share one account.
+    All clocks that shall show the same time share one account.
     """
 
     lost: int
 
 
-class _Own:
+class _PrivateAccount:
     lost = 0
 
 
 class PacedClock:
     """Simulated time: from 0 on, ``speed`` times as fast as ``clock``.
 
-    Between two waits it advances by at most ``stride`` (µs). Time that the user of the clock cannot keep up
-    with is given up and counted in ``lost`` (µs), so that there is never more than one stride to catch up
-    with.
+    Between two waits it advances by at most ``stride`` (µs). If its user is slower, the rest of the time is
+    given up and counted in ``lost`` (µs), so that the user is never more than one stride behind.
 
-    Copies in several processes show one time as long as they share an ``account``: what one of them gives up
-    is given up for all, and those that are ahead then wait for the others. None: the clock has an account of
-    its own.
+    Clocks in several processes show the same time if they share an ``account``: time that one of them gives
+    up is given up for all, and a clock that is ahead stands still until the others catch up. None: the clock
+    has an account of its own.
     """
 
     def __init__(self, clock: Clock, speed: float, stride: int, account: LostTime | None = None) -> None:
         self._clock, self._speed, self._stride = clock, speed, stride
         self._start = clock.now()
-        self._most = stride
+        self._limit = stride
         self._latest = 0
-        self._account: LostTime = _Own() if account is None else account
+        self._account: LostTime = _PrivateAccount() if account is None else account
 
     @property
     def start(self) -> int:
-        """Time that ``clock`` showed at 0, µs."""
+        """Time of ``clock`` at simulated time 0, µs."""
         return self._start
 
     @property
     def lost(self) -> int:
-        """Time given up, by all clocks of the account, µs."""
+        """Simulated time given up by all clocks of the account, µs."""
         return self._account.lost
 
     def now(self) -> int:
         """Return simulated time, µs."""
         passed = int((self._clock.now() - self._start) * self._speed)
         shown = passed - self._account.lost
-        if shown > self._most:
-            # Assigned, never incremented: two of several processes would book the same time twice.
-            self._account.lost = passed - self._most
-            shown = self._most
+        if shown > self._limit:
+            # Assigned, not incremented: with increments two processes could count the same time twice.
+            self._account.lost = passed - self._limit
+            shown = self._limit
         self._latest = max(self._latest, shown)
         return self._latest
 
     def wait_until(self, instant: int) -> None:
         """Wait until simulated time is ``instant`` (µs)."""
-        self._most = max(self._most, instant + self._stride)
+        self._limit = max(self._limit, instant + self._stride)
         while self.now() < instant:
-            # In a loop, because time that is lost meanwhile makes it later; 1 µs more, for the rounding.
+            # Repeated, because time given up during the wait postpones ``instant``; 1 µs more for rounding.
             lost = self._account.lost
             self._clock.wait_until(self._start + int((instant + lost) / self._speed) + 1)
-        self._most = self.now() + self._stride
+        self._limit = self.now() + self._stride
 
 
 class SkewedClock:
-    """Clock of a computer with an error: ``skew`` applied to what the true ``clock`` shows."""
+    """Clock with an error: ``skew`` applied to the time of the true ``clock``."""
 
     def __init__(self, clock: Clock, skew: NodeClock) -> None:
         self._clock, self._skew = clock, skew

@@ -1,15 +1,15 @@
-"""Clock of another machine, estimated from its messages; it may run ten times as fast as wall time.
+"""Clock of another machine, estimated from its messages; it may run much faster or slower than wall time.
 
 A stamp is the time of the sender's clock when the message left; the message arrives later by a varying delay.
 In the plane of arrival and stamp all messages lie on or below the line of messages without delay. That line
-is fitted to the upper edge of the last seconds, piece by piece (Moon, Skelly and Towsley, "Estimation and
-removal of clock skew from network delay measurements", 1999), and the clock runs along it.
+is fitted to the upper hull of the last seconds, one point for each piece of time (Moon, Skelly and Towsley,
+"Estimation and removal of clock skew from network delay measurements", 1999), and the clock runs along it.
 
-Only a simulation's clock is followed permanently. On a busy machine such a clock stops for a moment and never
-makes up for that. The followed clock then continues unchanged, and follows the stamps from there. A real
-autopilot's clock is as accurate as the own one, and a growing delay looks just like a slow clock. For a real
-autopilot wall time is therefore better, because old data then appears old. The clock decides once which of
-the two it follows.
+Only a simulation's clock is followed permanently. On a busy machine a simulation may stop for a moment and
+never make up for it. ``FollowedClock`` then continues without a jump, with a new offset to the stamps. A real
+autopilot's clock is as accurate as this machine's, and a growing delay looks like a slow clock. For a real
+autopilot ``FollowedClock`` therefore runs on wall time, so that delayed data has its true age. The kind of
+clock is decided once.
 """
 
 from __future__ import annotations
@@ -22,35 +22,36 @@ from typing import Final, NamedTuple
 
 from mavlink_bridge.clocks.clock import Clock
 
-_PIECE: Final = 250_000
-"""Length of a piece in µs of wall time; the stamp with the shortest delay represents its piece."""
-_MEMORY: Final = 24
-"""Number of pieces that are kept: six seconds."""
-_ENOUGH: Final = 4
+_PIECE_US: Final = 250_000
+"""Length of a piece in wall time; the stamp with the shortest delay represents its piece."""
+_MAX_PIECES: Final = 24
+"""Number of pieces to which the line is fitted: six seconds."""
+_MIN_PIECES: Final = 4
 """Least number of pieces for an estimate of the rate."""
-_STEP: Final = 500_000
-"""Deviation from the line (µs of wall time) that shows that the clock was set, stopped or restarted."""
-_STALL: Final = 50_000
-"""The same limit where the rate is off by more than ``_SPED``.
+_JUMP_US: Final = 500_000
+"""Deviation from the line (wall time) that indicates that the clock was set, stopped or restarted."""
+_STALL_US: Final = 50_000
+"""The same limit if the rate error is more than ``_MIN_STALL_RATE_ERROR``.
 
 It is lower because a simulation stops whenever its machine is busy with something else.
 """
-_SPED: Final = 0.02
-_EVIDENCE, _MORE = 10_000_000, 30_000_000
-"""µs of wall time after which the kind of clock is decided.
+_MIN_STALL_RATE_ERROR: Final = 0.02
+_MIN_EVIDENCE_US, _MIN_UNCLEAR_EVIDENCE_US = 10_000_000, 30_000_000
+"""Wall time after which the kind of clock is decided.
 
-The second is for a rate between ``_QUARTZ`` and ``_PACED``: a simulation on a busy machine or a growing
-queue; no queue grows evenly for so long.
+The second is for a rate error between ``_MAX_REAL_RATE_ERROR`` and ``_MIN_SIMULATED_RATE_ERROR``: a
+simulation on a busy machine, or a growing queue. No queue grows evenly for 30 s.
 """
-_QUARTZ, _PACED = 0.005, 0.2
-"""Limits of the rate error: up to the first the clock is real, above the second it is a simulation's."""
-_BENT: Final = 0.125
-"""Limit for even evidence: all stamps deviate by at most this share of the time that the rate has gained."""
-_SLEW: Final = 0.5
-"""Share of its rate at which a clock that is ahead continues: it never stops."""
-_WITNESSES: Final = 5
+_MAX_REAL_RATE_ERROR, _MIN_SIMULATED_RATE_ERROR = 0.005, 0.2
+"""Limits of |rate − 1|: up to the first the clock is real, above the second it is a simulation's."""
+_MAX_UNEVENNESS: Final = 0.125
+"""Limit for even evidence: largest spread of the stamps about the line, as a share of |rate − 1| · span."""
+_SLEW_RATE: Final = 0.5
+"""Share of the rate with which a clock that is ahead of the line continues until the line reaches it."""
+_JUMP_CONFIRMATIONS: Final = 5
+"""Number of consecutive deviating stamps that confirm a jump."""
 SLOWEST, FASTEST = 0.02, 100.0
-"""Limits of the rate; no simulator runs beyond them."""
+"""Limits to which the estimated rate is clipped."""
 
 
 class _Seen(NamedTuple):
@@ -61,15 +62,15 @@ class _Seen(NamedTuple):
 
 
 class FollowedClock:
-    """``Clock`` that follows the stamps of another clock, from ``begin`` (µs) on; it never goes back.
+    """``Clock`` that begins at ``begin`` (µs), follows the stamps of another clock, and never goes back.
 
-    Before the first stamp it runs as ``clock`` does. Where stamps jump, by more than half a second of wall
-    time, it continues as before and follows them from there; ``steps`` counts these jumps. It does the same
-    where a simulation has lost time. ``rate``: its rate relative to ``clock``. One thread may feed it while
-    others read it.
+    Before the first stamp it runs as ``clock`` does. Where stamps jump by more than half a second of wall
+    time, it continues without a jump and takes the new offset; ``steps`` counts these jumps. It does the
+    same, uncounted, where a simulation has lost 50 ms or more. ``rate``: its rate relative to ``clock``. One
+    thread may feed it while others read it.
 
-    ``simulated`` says whether the stamps are a simulation's. None: this is determined from ten to thirty
-    seconds of stamps; after them, unless they are a simulation's, the clock runs as ``clock`` does.
+    ``simulated``: whether the stamps are a simulation's. None: this is decided after ten to thirty seconds of
+    stamps; if they are not a simulation's, the clock then runs as ``clock`` does.
     """
 
     def __init__(self, clock: Clock, begin: int = 0, *, simulated: bool | None = True) -> None:
@@ -78,10 +79,10 @@ class FollowedClock:
         self._wall, self._shown = clock.now(), float(begin)
         self._latest = begin
         self._base: float | None = None
-        self._pieces: deque[_Seen] = deque(maxlen=_MEMORY)
+        self._pieces: deque[_Seen] = deque(maxlen=_MAX_PIECES)
         self._best: _Seen | None = None
         self._begun = 0
-        self._strayed = 0
+        self._deviating = 0
         self._surplus = 0.0
         self._known = False
         self._verdict = simulated
@@ -99,8 +100,8 @@ class FollowedClock:
     def wait_until(self, instant: int) -> None:
         """Sleep until this clock shows ``instant`` (µs)."""
         while (left := instant - self.now()) > 0:
-            # The line may be fitted again meanwhile, so read it again from time to time.
-            pause = min(left / self.rate, _PIECE)
+            # A new fit may change the line during the wait, so read the clock again after each piece.
+            pause = min(left / self.rate, _PIECE_US)
             self._clock.wait_until(self._clock.now() + max(1, round(pause)))
 
     def observe(self, wall: int, stamp: int) -> None:
@@ -109,21 +110,23 @@ class FollowedClock:
             if self._verdict is False:
                 return
             if self._base is None:
-                self._lay(wall, stamp)
+                self._restart(wall, stamp)
                 return
             ahead = stamp + self._base - self._line(wall)
-            stall = (_STALL if abs(self.rate - 1.0) > _SPED else _STEP) * max(1.0, self.rate)
+            stall = (_STALL_US if abs(self.rate - 1.0) > _MIN_STALL_RATE_ERROR else _JUMP_US) * max(
+                1.0, self.rate
+            )
             if self._known and abs(ahead) > stall:
-                self._strayed += 1
-                if self._strayed >= _WITNESSES:
-                    if abs(ahead) > _STEP * max(1.0, self.rate):
+                self._deviating += 1
+                if self._deviating >= _JUMP_CONFIRMATIONS:
+                    if abs(ahead) > _JUMP_US * max(1.0, self.rate):
                         self.steps += 1
                         self._evidence.clear()
-                    # Evidence before a smaller jump is kept: a delay that swings looks like such a jump,
-                    # again and again, and would never be judged otherwise.
-                    self._lay(wall, stamp)
+                    # Evidence before a smaller jump is kept. A varying delay looks like repeated small jumps;
+                    # if they cleared the evidence, the kind of clock would never be decided.
+                    self._restart(wall, stamp)
                 return
-            self._strayed = 0
+            self._deviating = 0
             self._gather(_Seen(wall, stamp))
 
     @property
@@ -138,27 +141,29 @@ class FollowedClock:
 
     @property
     def simulated(self) -> bool:
-        """Whether it follows a simulation's clock; before the decision, what the rate suggests so far."""
-        return self._off if self._verdict is None else self._verdict
+        """Whether the stamps are a simulation's; before the decision, whether the rate so far suggests it."""
+        return self._looks_simulated if self._verdict is None else self._verdict
 
-    # The methods below need the lock.
+    # Callers of the methods below hold the lock.
 
     @property
-    def _off(self) -> bool:
-        return abs(self.rate - 1.0) > _PACED
+    def _looks_simulated(self) -> bool:
+        return abs(self.rate - 1.0) > _MIN_SIMULATED_RATE_ERROR
 
     def _decide(self, wall: int) -> None:
-        """Decide the kind of clock for good, once there is enough evidence."""
+        """Decide the kind of clock, once, when there is enough evidence."""
         evidence = self._evidence
         span = evidence[-1].wall - evidence[0].wall
-        if self._verdict is not None or span < _EVIDENCE:
+        if self._verdict is not None or span < _MIN_EVIDENCE_US:
             return
         rate = _slope_above(evidence)
         off = abs(rate - 1.0)
-        if _QUARTZ < off <= _PACED and span < _MORE:
+        if _MAX_REAL_RATE_ERROR < off <= _MIN_SIMULATED_RATE_ERROR and span < _MIN_UNCLEAR_EVIDENCE_US:
             return
         self.judged = rate
-        self._verdict = off > _PACED or (off > _QUARTZ and _even(evidence, rate))
+        self._verdict = off > _MIN_SIMULATED_RATE_ERROR or (
+            off > _MAX_REAL_RATE_ERROR and _even(evidence, rate)
+        )
         evidence.clear()
         if not self._verdict:
             shown = float(self._read(wall))
@@ -168,28 +173,29 @@ class FollowedClock:
         return self._shown + self.rate * (wall - self._wall)
 
     def _slewed(self, wall: int) -> float:
-        """Return the line, plus the part of a surplus that is not worked off yet."""
+        """Return the line at ``wall``, plus the part of the surplus that slewing has not removed yet."""
         since = max(wall - self._wall, 0)
-        return self._line(wall) + max(0.0, self._surplus - (1.0 - _SLEW) * self.rate * since)
+        return self._line(wall) + max(0.0, self._surplus - (1.0 - _SLEW_RATE) * self.rate * since)
 
     def _read(self, wall: int) -> int:
         self._latest = max(self._latest, int(self._slewed(wall)))
         return self._latest
 
-    def _lay(self, wall: int, stamp: int) -> None:
-        """Continue from the time shown, and follow the stamps from ``stamp`` on."""
+    def _restart(self, wall: int, stamp: int) -> None:
+        """Continue from the time shown with a new offset to the stamps, and forget all pieces."""
         shown = float(self._read(wall))
         self._wall, self._shown, self._surplus = wall, shown, 0.0
         self._base = shown - stamp
-        self._strayed = 0
+        self._deviating = 0
         self._known = False
         self._pieces.clear()
         self._best, self._begun = _Seen(wall, stamp), wall
 
     def _gather(self, seen: _Seen) -> None:
         best = self._best
-        if best is not None and seen.wall - self._begun >= _PIECE:
-            # The piece ends before the new message: many may arrive at once, and no two pieces have one time.
+        if best is not None and seen.wall - self._begun >= _PIECE_US:
+            # The new message begins the next piece, so that no two pieces have the same arrival time, even
+            # if many messages arrive at once.
             self._pieces.append(best)
             self._fit(seen.wall)
             self._evidence.append(best)
@@ -203,7 +209,7 @@ class FollowedClock:
     def _fit(self, wall: int) -> None:
         """Fit the line again, from ``wall`` on."""
         pieces, base = self._pieces, self._base
-        if base is None or len(pieces) < _ENOUGH:
+        if base is None or len(pieces) < _MIN_PIECES:
             return
         rate = min(FASTEST, max(SLOWEST, _slope_above(pieces)))
         height = max(piece.stamp - rate * (piece.wall - wall) for piece in pieces)
@@ -217,15 +223,15 @@ class FollowedClock:
 
 
 def _even(pieces: Sequence[_Seen], rate: float) -> bool:
-    """Return whether all ``pieces`` lie near one line of that rate, relative to its distance from 1."""
+    """Return whether all ``pieces`` lie near one line of slope ``rate``, relative to |rate − 1| · span."""
     off = [piece.stamp - rate * (piece.wall - pieces[0].wall) for piece in pieces]
-    return max(off) - min(off) <= _BENT * abs(rate - 1.0) * (pieces[-1].wall - pieces[0].wall)
+    return max(off) - min(off) <= _MAX_UNEVENNESS * abs(rate - 1.0) * (pieces[-1].wall - pieces[0].wall)
 
 
 def _slope_above(pieces: Sequence[_Seen]) -> float:
-    """Return the slope of the line above all ``pieces`` that is nearest to them.
+    """Return the slope of the nearest line that lies above all ``pieces``.
 
-    It is the edge of their upper hull in the middle of their time.
+    This line is the edge of their upper hull at the middle of their time span.
     """
     hull: list[_Seen] = []
     for point in pieces:

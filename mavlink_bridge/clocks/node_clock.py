@@ -1,7 +1,7 @@
-"""Clock of one node's computer relative to true time: off by some µs, and fast or slow by some ppm.
+"""Clock of one node's computer relative to true time: with a constant offset and a constant drift.
 
-Integer arithmetic throughout, so that a reading and the instant of a reading are exact inverses on any
-machine.
+All arithmetic is in integers: on any machine ``instant`` is exactly the first true time at which ``reading``
+reaches a value.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ QUANTUM = 4
 The two low bits of a tlog's time stamp carry the link, so these times are multiples of 4 µs.
 """
 LARGEST_DRIFT_PPM = 100_000.0
+"""Limit of the drift in both directions."""
 
 _BILLION = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class NodeClock:
-    """Linear clock that shows ``since + offset`` (µs; negative: late) at true time ``since`` (µs).
+    """Linear clock that shows ``since + offset`` at true time ``since`` (µs; negative offset: it is behind).
 
-    From there on it runs ``drift_ppm`` fast (negative: slow; resolved to 0.001 ppm). Raises ScheduleError for
+    It runs ``drift_ppm`` fast (negative: slow; resolved to 0.001 ppm). Raises ScheduleError for
     a drift that is not within ±100 000 ppm.
     """
 
@@ -41,11 +42,11 @@ class NodeClock:
 
     @property
     def _rate(self) -> int:
-        """Advance of the clock in 10⁹ µs."""
+        """Advance of the clock (µs) in 10⁹ µs of true time."""
         return _BILLION + round(self.drift_ppm * 1000)
 
     def reading(self, true: int) -> int:
-        """Return what the clock shows at ``true`` (µs), to the µs; it never decreases."""
+        """Return what the clock shows (µs, rounded down) at ``true`` (µs)."""
         return self.since + self.offset + (true - self.since) * self._rate // _BILLION
 
     def local(self, true: int) -> int:

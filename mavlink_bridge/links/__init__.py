@@ -1,5 +1,5 @@
 """Links for datagrams between processes, which never wait.
 
-endpoint string → endpoints → opening → a link: udp, tcp, serial_port, replay, or link's pair in memory. Byte
-streams are cut into frames by stream and streams.
+endpoint string → endpoints → opening → a link: udp, tcp, serial_port, replay, or a pair in memory (link).
+stream and streams are the base of links over byte streams; demultiplexer divides one link among several.
 """

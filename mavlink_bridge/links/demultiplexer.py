@@ -1,6 +1,6 @@
 """Demultiplexer of one physical link that several links of a node share, as behind a MAVLink router.
 
-Received frames are distributed by their headers, and what is sent at any end leaves by the physical link.
+Received frames are distributed by their headers; data sent at any end leaves by the physical link.
 """
 
 from __future__ import annotations
@@ -15,32 +15,33 @@ from mavlink_bridge.wire.framing import Framer
 from mavlink_bridge.wire.header import Header
 
 Wants = Callable[[Header], bool]
+"""Predicate: whether an end receives frames with this header."""
 ROOM: Final = 1 << 20
 """Largest number of bytes that wait at an end."""
-_ROUNDS: Final = 1000
-"""Number of reads after which ``forget`` ends even if data keeps arriving: more than any system buffers."""
+_MAX_FORGET_READS: Final = 1000
+"""Largest number of reads of ``forget``, in case data keeps arriving: more than any system buffers."""
 
 
 class FrameObserver(Protocol):
     """Observer of all frames that pass a ``Demultiplexer``."""
 
     def said(self, data: bytes) -> None:
-        """Observe frames that leave, by whichever end."""
+        """Observe frames that leave by any end."""
         ...
 
     def received(self, header: Header, frame: bytes) -> None:
-        """Observe a frame that arrives, whichever end gets it."""
+        """Observe a frame that arrives, for any end or none."""
         ...
 
 
 class Demultiplexer:
     """Demultiplexer of ``link``: one end for each name of ``deal``.
 
-    The function of a name in ``deal`` decides which headers its end gets. A frame goes to every end that
-    wants it, and is discarded if none does. Checksums are verified, signatures are not. ``observer`` observes
-    all frames.
+    ``deal`` maps the name of an end to a predicate. A frame goes to every end whose predicate is true of its
+    header, and is discarded if there is none. Frames with a wrong checksum or of a message that the dialect
+    lacks are discarded, too; signatures are not verified. ``observer`` observes all other frames.
 
-    The ends are read by one thread at a time. The physical link is closed with the last of them.
+    Only one thread at a time may read the ends. Closing the last end closes the physical link.
     """
 
     def __init__(self, link: Link, deal: Mapping[str, Wants], observer: FrameObserver | None = None) -> None:
@@ -72,12 +73,12 @@ class Demultiplexer:
         self.link.send(data)
 
     def forget(self) -> None:
-        """Discard all that has arrived until now, at all ends.
+        """Discard all data that has arrived until now, at all ends.
 
-        ``observer`` does not receive it either, because the time of its sending is unknown.
+        ``observer`` does not receive these frames either, because the time of their sending is unknown.
         """
-        for _ in range(_ROUNDS):
-            # A read that returns nothing may have accepted a TCP connection whose peer has sent already.
+        for _ in range(_MAX_FORGET_READS):
+            # A read that returns nothing may have accepted a TCP connection on which data waits already.
             if not self.link.receive() and not _readable(self.link.fileno()):
                 break
         self._framer = Framer()
@@ -85,7 +86,7 @@ class Demultiplexer:
             end.clear()
 
     def leave(self) -> None:
-        """Record that one end is closed; close the physical link with the last one."""
+        """Record that one end is closed; close the physical link if it was the last one."""
         self._open -= 1
         if not self._open:
             self.link.close()
@@ -97,7 +98,7 @@ def _readable(fileno: int | None) -> bool:
 
 
 class DemultiplexedLink:
-    """One end of a ``Demultiplexer``: a ``Link``; if it is not read, the oldest data is dropped."""
+    """One end of a ``Demultiplexer``, a ``Link``; while it is not read, the oldest data is dropped."""
 
     def __init__(self, demultiplexer: Demultiplexer, *, first: bool) -> None:
         self._demultiplexer, self._first = demultiplexer, first
@@ -108,15 +109,15 @@ class DemultiplexedLink:
 
     @property
     def counters(self) -> LinkCounters:
-        """Counts of this end; ``dropped`` is that of the physical link, for all its ends."""
+        """Counts of this end; ``dropped`` is the count of the physical link, for all ends."""
         return LinkCounters(self._received, self._sent, self._demultiplexer.link.counters.dropped)
 
     def fileno(self) -> int | None:
-        """Return that of the physical link for the first end, None for the others."""
+        """Return the file descriptor of the physical link for the first end, None for the others."""
         return self._demultiplexer.link.fileno() if self._first else None
 
     def put(self, data: bytes) -> None:
-        """Add some frames for this end."""
+        """Queue ``data`` (complete frames) for this end; above the limits drop the oldest data."""
         if not self._open:
             return
         self._waiting.append(data)
@@ -125,12 +126,12 @@ class DemultiplexedLink:
             self._bytes -= len(self._waiting.popleft())
 
     def clear(self) -> None:
-        """Discard what waits."""
+        """Discard the data that waits."""
         self._waiting.clear()
         self._bytes = 0
 
     def receive(self) -> list[bytes]:
-        """Return the frames that were distributed to this end."""
+        """Read the physical link and return the frames for this end, at most ``BURST`` datagrams."""
         if not self._open:
             return []
         self._demultiplexer.read()

@@ -2,11 +2,11 @@
 
 The forms are those of pymavlink and MAVProxy; ``//`` after the colon, as MAVSDK writes it, is allowed::
 
-    udpin:HOST:PORT        listen; answer every sender            tcp:HOST:PORT      connect, again and again
+    udpin:HOST:PORT        listen; send to recent senders         tcp:HOST:PORT      connect, again and again
     udpout:HOST:PORT       send first                             tcpin:HOST:PORT    accept connections
-    udpin:HOST:PORT,HOST:PORT    listen, and send to the second address, too, from the beginning
+    udpin:HOST:PORT,HOST:PORT    listen, and always send to the second address, too
     mcast:[GROUP[:PORT]][,INTERFACE]                              /dev/DEVICE,BAUD   serial port
-    tlog:PATH              a log, at the times it was recorded at
+    tlog:PATH              frames of a log, with their recorded timing
 
 HOST is a name, an IPv4 address, or an IPv6 address in brackets. INTERFACE is the IPv4 address of an interface
 of this machine; with a loopback address (127.0.0.1) multicast stays on this machine.
@@ -35,10 +35,10 @@ _FORMS: Final = (
     "udpin:HOST:PORT, udpout:HOST:PORT, mcast:GROUP:PORT, tcp:HOST:PORT, tcpin:HOST:PORT, "
     "/dev/DEVICE,BAUD or tlog:PATH"
 )
-_NAME = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9_.-]{0,251}[A-Za-z0-9_.])?")
-_SIX = re.compile(r"[0-9A-Fa-f:.]+(?:%[A-Za-z0-9_.-]{1,32})?")
+_HOST_NAME = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9_.-]{0,251}[A-Za-z0-9_.])?")
+_IPV6 = re.compile(r"[0-9A-Fa-f:.]+(?:%[A-Za-z0-9_.-]{1,32})?")
 _NUMBER = re.compile(r"[0-9]{1,9}")
-_LONGEST_SHOWN = 100
+_MAX_SHOWN = 100
 
 
 def _address(host: str, port: int) -> str:
@@ -47,10 +47,10 @@ def _address(host: str, port: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class UdpIn:
-    """UDP socket bound to ``host``, ``port`` (0: a free one of the system's choice).
+    """UDP socket bound to ``host``, ``port`` (0: the system chooses a free one).
 
-    ``peer``: host and port of a peer that is sent everything before it has sent anything itself, as
-    autopilots do with a ground station.
+    ``peer``: host and port that everything is sent to, even before it has sent anything, as autopilots do
+    with a ground station.
     """
 
     host: str
@@ -75,7 +75,7 @@ class UdpOut:
 
 @dataclass(frozen=True, slots=True)
 class Multicast:
-    """Multicast group; ``interface``: an IPv4 address, None leaves it to the routing table."""
+    """Multicast group; ``interface``: its IPv4 address, None: chosen by the routing table."""
 
     group: str = MULTICAST_GROUP
     port: int = MULTICAST_PORT
@@ -99,7 +99,7 @@ class TcpOut:
 
 @dataclass(frozen=True, slots=True)
 class TcpIn:
-    """TCP server on ``host``, ``port`` (0: a free one of the system's choice)."""
+    """TCP server on ``host``, ``port`` (0: the system chooses a free one)."""
 
     host: str
     port: int
@@ -121,7 +121,7 @@ class Serial:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """Frames of the tlog at ``path``, read only."""
+    """Frames of the tlog at ``path``; nothing can be sent."""
 
     path: str
 
@@ -133,14 +133,14 @@ Endpoint = UdpIn | UdpOut | Multicast | TcpOut | TcpIn | Serial | Replay
 
 
 def parse_endpoint(text: str) -> Endpoint:
-    """Parse an endpoint; ``parse_endpoint(str(endpoint))`` is ``endpoint``.
+    """Parse an endpoint; ``parse_endpoint(str(endpoint))`` equals ``endpoint``.
 
-    Raises EndpointError, one line: the text, what is wrong, what is allowed.
+    Raises EndpointError, with one line: the text, the fault, the allowed forms.
     """
     try:
         return _parse(text)
     except _FormError as fault:
-        shown = text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "…"
+        shown = text if len(text) <= _MAX_SHOWN else text[:_MAX_SHOWN] + "…"
         raise EndpointError(f"{shown!r}: {fault}") from None
 
 
@@ -152,9 +152,9 @@ def _parse(text: str) -> Endpoint:
     if text.startswith("/"):
         return _serial(text)
     scheme, colon, rest = text.partition(":")
-    if not colon or scheme not in _KINDS:
+    if not colon or scheme not in _PARSERS:
         raise _FormError(f"no endpoint begins with {scheme[:20]!r}; allowed are {_FORMS}")
-    return _KINDS[scheme](rest)
+    return _PARSERS[scheme](rest)
 
 
 def _udp_in(rest: str) -> UdpIn:
@@ -182,7 +182,7 @@ def _multicast(rest: str) -> Multicast:
     group = group or MULTICAST_GROUP
     try:
         if not IPv4Address(group).is_multicast:
-            raise _FormError(f"group {group!r} is none: 224.0.0.0 to 239.255.255.255 are; the form is {form}")
+            raise _FormError(f"group {group!r} is outside 224.0.0.0…239.255.255.255; the form is {form}")
     except AddressValueError:
         raise _FormError(f"group {group!r} is no IPv4 address; the form is {form}") from None
     if comma:
@@ -190,7 +190,7 @@ def _multicast(rest: str) -> Multicast:
             IPv4Address(interface)
         except AddressValueError:
             raise _FormError(
-                f"interface {interface!r} is not the IPv4 address of one (127.0.0.1 stays on this machine); "
+                f"interface {interface!r} is no IPv4 address (127.0.0.1 stays on this machine); "
                 f"the form is {form}"
             ) from None
     number = _port(port, 1, form) if colon else MULTICAST_PORT
@@ -204,7 +204,7 @@ def _serial(text: str) -> Serial:
             "the baud rate is missing; the form is /dev/DEVICE,BAUD, for example /dev/ttyACM0,57600"
         )
     if "\0" in device:
-        raise _FormError("a path has no NUL in it")
+        raise _FormError("the path of the device has a NUL in it; the form is /dev/DEVICE,BAUD")
     if not device.strip("/"):
         raise _FormError(
             "the device is missing; the form is /dev/DEVICE,BAUD, for example /dev/ttyACM0,57600"
@@ -220,7 +220,7 @@ def _replay(rest: str) -> Replay:
     return Replay(rest)
 
 
-_KINDS: Final[dict[str, Callable[[str], Endpoint]]] = {
+_PARSERS: Final[dict[str, Callable[[str], Endpoint]]] = {
     "udpin": _udp_in,
     "udpout": _udp_out,
     "mcast": _multicast,
@@ -247,13 +247,13 @@ def _host(text: str, form: str) -> str:
     if text.startswith("[") and text.endswith("]"):
         try:
             # IPv6Address accepts anything as a zone (%eth0).
-            if _SIX.fullmatch(text[1:-1]) is None:
+            if _IPV6.fullmatch(text[1:-1]) is None:
                 raise AddressValueError
             IPv6Address(text[1:-1])
         except AddressValueError:
             raise _FormError(f"host {text[:60]!r} is no IPv6 address; the form is {form}") from None
         return text[1:-1]
-    if _NAME.fullmatch(text) is None:
+    if _HOST_NAME.fullmatch(text) is None:
         raise _FormError(
             f"host {text[:60]!r} is neither a name nor an address (IPv6 in brackets); the form is {form}"
         )

@@ -13,10 +13,10 @@ from mavlink_bridge.links.endpoints import Endpoint
 def resolved(
     endpoint: Endpoint, host: str, port: int, kind: socket.SocketKind
 ) -> tuple[socket.AddressFamily, tuple[Any, ...]]:
-    """Return family and address for ``host``.
+    """Return address family and socket address of ``host`` and ``port``.
 
-    IPv4 is preferred where a name has both, because MAVLink tools listen there. The call may query a name
-    server and block meanwhile. Raises LinkError.
+    IPv4 is preferred if a name has addresses of both families, because MAVLink tools listen there. The call
+    blocks while it queries a name server. Raises LinkError if there is no address.
     """
     try:
         found = socket.getaddrinfo(host, port, type=kind)
@@ -29,5 +29,5 @@ def resolved(
 
 
 def because(error: OSError) -> str:
-    """Return the system's text for an error number."""
+    """Return the system's text for the number of ``error``."""
     return os.strerror(error.errno) if error.errno is not None else str(error)

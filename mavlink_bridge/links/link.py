@@ -1,7 +1,7 @@
 """Interface of every link: transfer of datagrams between this process and others, without waiting.
 
-A link does not interpret the data. If complete MAVLink frames go in, complete frames come out, also where the
-transport is a stream that cuts them anywhere.
+A link does not interpret the data. If the sender passes complete MAVLink frames, the receiver gets complete
+frames, even if the transport is a stream that cuts them anywhere.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 BURST = 1024
 """Largest number of datagrams of one ``receive``: a flood must not occupy its reader for ever."""
 WAITING = 4096
-"""Largest number of datagrams that wait in a MemoryLink."""
+"""Largest number of datagrams that wait at the end of a link within this process."""
 
 
 class LinkCounters(NamedTuple):
@@ -29,9 +29,9 @@ class LinkCounters(NamedTuple):
 class Link(Protocol):
     """One open end of a link.
 
-    ``receive`` and ``send`` may be called by two different threads, each by one at a time.
+    One thread at a time may call ``receive``, and one, the same or another, ``send``.
 
-    Neither waits, and neither raises for trouble on the way. A lost peer, an unplugged cable or a full buffer
+    Neither call waits or raises an error of the transport. A lost peer, an unplugged cable or a full buffer
     shows in the counters, and the link recovers by itself where that is possible.
     """
 
@@ -44,12 +44,12 @@ class Link(Protocol):
         """Return the file descriptor to wait for, or None if there is none and the link must be polled.
 
         When it is readable, ``receive`` has something to do. It stays the same as long as the link is open. A
-        link that has lost its peer tries to reconnect when it is polled, so poll it also without cause.
+        link that has lost its peer tries to reconnect in ``receive``, so call that periodically as well.
         """
         ...
 
     def receive(self) -> list[bytes]:
-        """Return all that has arrived, oldest first, but no more than BURST; empty when there is nothing."""
+        """Return datagrams that have arrived, in order for each peer, at most ``BURST``; the rest waits."""
         ...
 
     def send(self, data: bytes) -> None:
@@ -65,7 +65,7 @@ class Link(Protocol):
 
 
 class MemoryLink:
-    """One of two ends within a process, see ``memory_pair``; a full end drops the oldest data."""
+    """One of two connected ends within a process, see ``memory_pair``; a full end drops its oldest data."""
 
     def __init__(self, ours: deque[bytes], theirs: deque[bytes]) -> None:
         self._ours, self._theirs = ours, theirs
@@ -74,15 +74,15 @@ class MemoryLink:
 
     @property
     def counters(self) -> LinkCounters:
-        """Counts; the sender drops nothing."""
+        """Counts; ``dropped`` is always 0, because the receiving end drops."""
         return LinkCounters(self._received, self._sent, 0)
 
     def fileno(self) -> None:
-        """Return None: there is nothing to wait for."""
+        """Return None: the link must be polled."""
 
     def receive(self) -> list[bytes]:
         """Return what the other end has sent."""
-        # Only this end removes data, so the counted datagrams are there.
+        # Only this end removes datagrams, so at least the counted number is present.
         found = [self._ours.popleft() for _ in range(min(len(self._ours), BURST))] if self._open else []
         self._received += len(found)
         return found

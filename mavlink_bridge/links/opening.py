@@ -24,8 +24,8 @@ from mavlink_bridge.links.udp import MulticastLink, UdpCaller, UdpListener
 def open_link(endpoint: Endpoint | str, clock: Clock) -> Link:
     """Open the link to ``endpoint``; ``clock`` times reconnections, replays and the removal of silent peers.
 
-    Raises EndpointError for a text that is no endpoint, LinkError (LogError for a log) if it cannot be
-    opened.
+    Raises EndpointError for a text that is no endpoint, LinkError (LogError for a log) if the endpoint cannot
+    be opened.
     """
     match parse_endpoint(endpoint) if isinstance(endpoint, str) else endpoint:
         case UdpIn() as place:

@@ -10,12 +10,12 @@ from mavlink_bridge.tlog.log import Record, read_tlog
 
 
 class ReplayLink:
-    """Link that returns every record of a log as one datagram.
+    """Link that returns each record of a log as a datagram of its own.
 
-    The log's both directions and all its links are included: a receiver must filter out its own messages. A
-    record whose time steps back arrives with the previous one.
+    Records of both directions and of all links of the log are included: a receiver must filter out its own
+    messages. A record whose time steps back arrives with the previous one.
 
-    What is sent is discarded and counts as dropped. Raises LogError if the log cannot be read.
+    Sent datagrams are discarded and count as dropped. Raises LogError if the log cannot be read.
     """
 
     def __init__(self, endpoint: Replay, clock: Clock) -> None:
@@ -27,7 +27,7 @@ class ReplayLink:
 
     @property
     def counters(self) -> LinkCounters:
-        """Counts; nothing is ever sent."""
+        """Counts; ``sent`` is always 0."""
         return LinkCounters(self._received, 0, self._dropped)
 
     @property
@@ -36,10 +36,10 @@ class ReplayLink:
         return self._next is None
 
     def fileno(self) -> None:
-        """Return None: only time makes data arrive."""
+        """Return None: the link must be polled."""
 
     def receive(self) -> list[bytes]:
-        """Return what was recorded up to now."""
+        """Return the frames whose time has come, at most ``BURST``."""
         found: list[bytes] = []
         if self._next is None:
             return found

@@ -18,35 +18,35 @@ if sys.platform != "win32":
     import termios
 
 QUEUE: Final = 0.25
-"""s of the line's capacity that may wait to be sent; more is refused.
+"""Largest send queue, in s of the line's capacity; while it is longer, datagrams are dropped.
 
-The system alone would queue 4 KiB, 0.7 s of 57 600 baud: too old for set-points.
+The system would queue 4 KiB, 0.7 s at 57 600 baud, which is too late for set-points.
 """
-_BITS: Final = 10  # bits of a byte on the line, with start and stop bit
+_BITS_PER_BYTE: Final = 10  # with start and stop bit
 
 
 class SerialPort(StreamLink):
     """Link of ``/dev/…,BAUD``.
 
     A port that vanishes (a cable pulled out) is opened again when it is back. Raises LinkError if it is
-    missing at first, is in use by another process, or is no serial port.
+    missing at first, in use by another process, or no serial port, or if the system lacks its baud rate.
     """
 
     def __init__(self, endpoint: Serial, clock: Clock) -> None:
         if sys.platform == "win32":
             raise LinkError(f"{endpoint}: serial ports need a POSIX system; use udpin: or tcp: here")
         self._endpoint = endpoint
-        self._most = max(int(QUEUE * endpoint.baud / _BITS), 1)
+        self._max_queued = max(int(QUEUE * endpoint.baud / _BITS_PER_BYTE), 1)
         self._speed = getattr(termios, f"B{endpoint.baud}", None)
         if self._speed is None:
             raise LinkError(f"{endpoint}: this system knows no {endpoint.baud} baud")
-        first = self._raw()
-        super().__init__(clock, self._most)
+        first = self._open_port()
+        super().__init__(clock, self._max_queued)
         self._adopt(first)
 
     def send(self, data: bytes) -> None:
-        """Write ``data`` if the line will transmit it soon; drop it otherwise."""
-        if self._queued() > self._most:
+        """Write ``data``, or drop it if more than ``QUEUE`` waits to be transmitted."""
+        if self._queued() > self._max_queued:
             with self._lock:
                 self._dropped += 1
             return
@@ -55,8 +55,8 @@ class SerialPort(StreamLink):
     def let_go(self) -> None:
         """Leave the port to a process that was forked with it.
 
-        The next call of receive or send here opens the port again. The copy must be closed: a port that was
-        pulled out comes back under another name while any process has it open.
+        This process closes its descriptor: as long as any process has an unplugged port open, the port comes
+        back under another name. The next call of receive or send in this process opens the port again.
         """
         with self._lock:
             self._forget()
@@ -64,11 +64,11 @@ class SerialPort(StreamLink):
 
     def _reopen(self, now: int) -> None:
         try:
-            self._adopt(self._raw())
+            self._adopt(self._open_port())
         except LinkError:
             return
 
-    def _raw(self) -> int:
+    def _open_port(self) -> int:
         """Open the port for exclusive use, set it up, and return its file descriptor."""
         try:
             port = os.open(self._endpoint.device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -79,7 +79,7 @@ class SerialPort(StreamLink):
             _, _, control, _, _, _, characters = termios.tcgetattr(port)
             control &= ~(termios.CSIZE | termios.PARENB | termios.CSTOPB | getattr(termios, "CRTSCTS", 0))
             control |= termios.CS8 | termios.CREAD | termios.CLOCAL
-            # VMIN may be 0 from an earlier user: then an idle port would look like one that is gone.
+            # With VMIN = 0, as an earlier user may have set it, an idle port would look like a removed one.
             characters[termios.VMIN], characters[termios.VTIME] = 1, 0
             speed = self._speed
             termios.tcsetattr(port, termios.TCSANOW, [0, 0, control, 0, speed, speed, characters])

@@ -1,4 +1,4 @@
-"""One byte stream, without waiting: input is assembled into frames, and output is never cut within one."""
+"""Non-blocking byte stream: input is assembled into whole frames, and output is never cut within a frame."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _CHUNK: Final = 8192
 class Assembler:
     """Assembler that holds back the beginning of a frame until its rest has arrived.
 
-    Nothing is lost: all other bytes, garbage included, are passed on at once, so that the decoder can count
-    them. (Garbage that looks like a start may make the decoder wait for the next piece; complete frames alone
-    never do.)
+    All other bytes, garbage included, are passed on at once, so that the decoder can count them. A frame of
+    an unknown message is held back until the byte after it arrives. Garbage that looks like the start of a
+    frame may make the decoder wait for the next piece.
     """
 
     def __init__(self) -> None:
@@ -34,8 +34,8 @@ class Assembler:
 class Stream:
     """Non-blocking stream over a file descriptor, which it owns.
 
-    When the other side is slow, up to ``backlog`` bytes wait (or one datagram that is longer). Beyond that,
-    whole datagrams are refused: late data is worth less than newer data.
+    If the other side is slow, up to ``backlog`` bytes wait (or one longer datagram). Further datagrams are
+    refused as a whole, which bounds the delay.
     """
 
     def __init__(self, fileno: int, backlog: int) -> None:
@@ -46,7 +46,7 @@ class Stream:
         self._waiting = b""
         self._stuck_at: int | None = None
         self.alive = True
-        """False once the other side is gone; then only ``close`` is useful."""
+        """False after the other side has closed or an error; then only ``close`` is useful."""
 
     @property
     def waits(self) -> bool:
@@ -58,9 +58,9 @@ class Stream:
         return self._fileno
 
     def read(self) -> bytes | None:
-        """Return what has arrived, about 8 KiB at most; None if there is nothing.
+        """Return the complete frames of one read of 8 KiB at most; None if nothing could be read.
 
-        Frames are returned complete.
+        The result is empty if only a part of a frame has arrived.
         """
         try:
             data = os.read(self._fileno, _CHUNK)
@@ -74,7 +74,10 @@ class Stream:
         return self._assembler.feed(data)
 
     def stuck(self, now: int) -> int:
-        """Return for how long (µs), at ``now``, the other side has taken nothing of the data that waits."""
+        """Return for how long (µs) the other side has taken none of the waiting data; 0 if none waits.
+
+        The time counts from the first call of ``stuck`` after the last successful write.
+        """
         if not self._waiting:
             return 0
         if self._stuck_at is None:
@@ -82,7 +85,7 @@ class Stream:
         return now - self._stuck_at
 
     def write(self, data: bytes) -> bool:
-        """Write ``data``, or return False if it was refused; then none of it has been or will be written."""
+        """Write or queue all of ``data`` and return True, or return False if all of it is refused."""
         self.flush()
         if not self.alive or (self._waiting and len(self._waiting) + len(data) > self._backlog):
             return False
@@ -91,7 +94,7 @@ class Stream:
         return True
 
     def flush(self) -> None:
-        """Write as much of the waiting data as there is room for."""
+        """Write as much of the waiting data as the system accepts."""
         try:
             while self._waiting:
                 self._waiting = self._waiting[os.write(self._fileno, self._waiting) :]

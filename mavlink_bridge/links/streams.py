@@ -13,17 +13,18 @@ from mavlink_bridge.links.stream import Stream
 RETRY: Final = 1_000_000
 """µs between two attempts to reconnect."""
 HUNG: Final = 30_000_000
-"""µs after which a peer that takes no data is dropped: it would keep its place for ever."""
-_ENOUGH: Final = 16384
-# Bytes of all streams that are read at once: there may be many streams, full of data that is slow to parse.
+"""µs after which a peer that takes no data is disconnected; otherwise it would occupy its place for ever."""
+_MAX_READ_BYTES: Final = 16384
+"""Bytes after which one ``receive`` reads no further stream: many full streams would take long to parse."""
 
 
 class StreamLink:
     """Link over any number of streams.
 
-    A stream that breaks or hangs is dropped, and if none is left, ``_reopen`` is called once a second.
+    A stream that breaks or hangs is closed. While none is open, ``_reopen`` is called at most once a second,
+    by ``receive`` and ``send``.
 
-    The two threads that may use a link share its streams, hence the lock; nothing within it waits.
+    A lock protects the streams, because two threads may use a link; its holder never blocks.
     """
 
     def __init__(self, clock: Clock, backlog: int) -> None:
@@ -42,8 +43,8 @@ class StreamLink:
     def counters(self) -> LinkCounters:
         """Counts of datagrams.
 
-        A datagram that at least one of several peers takes is sent; on a stream, the result of one read is
-        one datagram.
+        A datagram counts as sent if at least one peer takes it. The frames of one read count as one received
+        datagram.
         """
         return LinkCounters(self._received, self._sent, self._dropped)
 
@@ -57,7 +58,7 @@ class StreamLink:
         return self._fileno
 
     def receive(self) -> list[bytes]:
-        """Return what has arrived on all streams; also continue pending connections and writes."""
+        """Return what has arrived, up to about 24 KiB; also continue pending connections and writes."""
         with self._lock:
             found: list[bytes] = []
             if not self._open:
@@ -67,13 +68,13 @@ class StreamLink:
             for stream in self._ready():
                 if not isinstance(stream, Stream):
                     self._attend(stream)
-                elif size < _ENOUGH:
+                elif size < _MAX_READ_BYTES:
                     size += self._serve(stream, found)
             self._received += len(found)
             return found
 
     def send(self, data: bytes) -> None:
-        """Write ``data`` to all streams that have room for all of it."""
+        """Write ``data`` to every stream that accepts all of it."""
         with self._lock:
             taken = False
             if self._open:
@@ -101,9 +102,9 @@ class StreamLink:
     # For subclasses.
 
     def _forget(self) -> None:
-        """Close this process's copies of all streams, and discard what waits for them.
+        """Close this process's descriptors of all streams, and discard the data that waits for them.
 
-        The selector of the other process, which is the same object of the system, stays as it is.
+        The selector is replaced and not modified, because a forked process shares it.
         """
         if not self._open:
             return
@@ -121,7 +122,7 @@ class StreamLink:
         self._selector.register(stream, selectors.EVENT_READ)
 
     def _reopen(self, now: int) -> None:
-        """Open a stream, or begin to, when none is left at ``now`` (µs)."""
+        """Open a stream, or begin to; called at ``now`` (µs) when none is open."""
 
     def _attend(self, ready: Any) -> None:
         """Handle ``ready``, which is registered in the selector and is not a stream."""
@@ -140,16 +141,13 @@ class StreamLink:
             self._reopen(now)
 
     def _ready(self) -> list[Any]:
-        """Return what is ready, each time beginning with another one."""
+        """Return the ready objects, in an order that rotates from call to call."""
         ready = [key.fileobj for key, _ in self._selector.select(0)]
         self._turn = turn = (self._turn + 1) % max(len(ready), 1)
         return ready[turn:] + ready[:turn]
 
     def _serve(self, stream: Stream, found: list[bytes]) -> int:
-        """Read a little, so that the busiest sender does not displace the others; return the number of bytes.
-
-        The rest is read the next time.
-        """
+        """Read ``stream`` once, so that a busy sender does not delay others; return the number of bytes."""
         data = stream.read()
         if data:
             found.append(data)
@@ -158,7 +156,7 @@ class StreamLink:
         return len(data or b"")
 
     def _settle(self, stream: Stream) -> None:
-        """Watch for room only while something waits for it; drop a stream that is broken or hung."""
+        """Select for writing only while data waits; close and remove a stream that is broken or hung."""
         if not stream.alive or (stream.waits and stream.stuck(self._clock.now()) > HUNG):
             self._selector.unregister(stream)
             self._streams.remove(stream)

@@ -14,88 +14,91 @@ from mavlink_bridge.links.hosts import because, resolved
 from mavlink_bridge.links.streams import StreamLink
 
 MOST_CALLERS: Final = 32
+"""Largest number of peers of a listener; further connections are closed at once."""
 BACKLOG: Final = 65536
-"""Bytes; some seconds of a vehicle's telemetry."""
+"""Bytes that may wait for one peer: some seconds of a vehicle's telemetry."""
 PATIENCE: Final = 5_000_000
-"""µs after which a connection attempt ends: a lost packet is repeated after one second and after three."""
+"""µs after which a connection attempt is aborted: TCP repeats a lost packet after one and three seconds."""
 
-
-_UNHEARD: Final = 30
-# s without an answer from the other machine: for data that it has not acknowledged, and for probes when idle.
-_WATCH: Final = {
-    "TCP_USER_TIMEOUT": 1000 * _UNHEARD,
+_PEER_TIMEOUT_S: Final = 30
+# For sent data that the peer has not acknowledged. An idle connection ends after 15 s + 3 probes of 5 s.
+_TIMEOUT_OPTIONS: Final = {
+    "TCP_USER_TIMEOUT": 1000 * _PEER_TIMEOUT_S,
     "TCP_KEEPIDLE": 15,
     "TCP_KEEPINTVL": 5,
     "TCP_KEEPCNT": 3,
 }
 
 
-def _quick(connection: socket.socket) -> None:
+def _configure(connection: socket.socket) -> None:
     """Configure ``connection`` for low latency and detection of a lost peer.
 
-    Small packets are sent at once; little waits in the system beside the own backlog; and where the system
-    supports it, a lost peer is detected within half a minute.
+    Small packets are sent at once, the system's send buffer is small, and where the system supports it, a
+    lost peer is detected within half a minute.
     """
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BACKLOG)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    for name, value in _WATCH.items():
+    for name, value in _TIMEOUT_OPTIONS.items():
         option = getattr(socket, name, None)
         if option is not None:
             connection.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
 class TcpCaller(StreamLink):
-    """Link of ``tcp``: it attempts to connect once a second until a peer accepts.
+    """Link of ``tcp``, which attempts to connect until a peer accepts, at most once a second.
 
-    A missing peer is no error at first: the other side may be started later.
+    A missing peer is not an error, because the other side may be started later.
     """
 
     def __init__(self, endpoint: TcpOut, clock: Clock) -> None:
-        # First, so that a host without address leaves nothing open.
+        # Before anything is opened, because it may raise.
         self._family, self._address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
         super().__init__(clock, BACKLOG)
-        self._calling: socket.socket | None = None
-        self._called_at = 0
+        self._attempt: socket.socket | None = None
+        self._attempt_began = 0
         self.receive()
 
     def _reopen(self, now: int) -> None:
-        if self._calling is not None and now - self._called_at < PATIENCE:
+        if self._attempt is not None and now - self._attempt_began < PATIENCE:
             return
-        self._disconnect()
-        call = socket.socket(self._family, socket.SOCK_STREAM)
-        call.setblocking(False)
+        self._abort_attempt()
+        connection = socket.socket(self._family, socket.SOCK_STREAM)
+        connection.setblocking(False)
         try:
-            call.connect(self._address)
+            connection.connect(self._address)
         except BlockingIOError:
-            pass  # the usual case: the socket becomes writable when the connection is decided
+            pass  # the usual case: the socket becomes writable when the attempt succeeds or fails
         except OSError:
-            call.close()
+            connection.close()
             return
-        self._calling, self._called_at = call, now
-        self._selector.register(call, selectors.EVENT_WRITE)
+        self._attempt, self._attempt_began = connection, now
+        self._selector.register(connection, selectors.EVENT_WRITE)
 
     def _attend(self, ready: Any) -> None:
-        call = self._calling
-        if call is None or ready is not call:
+        connection = self._attempt
+        if connection is None or ready is not connection:
             return
-        # A connection to a free port of this machine may by chance reach itself.
-        if call.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) or call.getsockname() == self._address:
-            self._disconnect()
+        # A TCP connection to a free port of this machine may by chance be connected to itself.
+        if (
+            connection.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+            or connection.getsockname() == self._address
+        ):
+            self._abort_attempt()
             return
-        self._selector.unregister(call)
-        self._calling = None
-        _quick(call)
-        self._adopt(call.detach())
+        self._selector.unregister(connection)
+        self._attempt = None
+        _configure(connection)
+        self._adopt(connection.detach())
 
-    def _disconnect(self) -> None:
-        if self._calling is not None:
-            self._selector.unregister(self._calling)
-            self._calling.close()
-            self._calling = None
+    def _abort_attempt(self) -> None:
+        if self._attempt is not None:
+            self._selector.unregister(self._attempt)
+            self._attempt.close()
+            self._attempt = None
 
     def _release(self) -> None:
-        self._disconnect()
+        self._abort_attempt()
 
 
 class TcpListener(StreamLink):
@@ -104,36 +107,36 @@ class TcpListener(StreamLink):
     def __init__(self, endpoint: TcpIn, clock: Clock) -> None:
         family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
         super().__init__(clock, BACKLOG)
-        self._door = door = socket.socket(family, socket.SOCK_STREAM)
+        self._listener = listener = socket.socket(family, socket.SOCK_STREAM)
         try:
-            # Without it a restart would have to wait a minute for the port.
-            door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            door.bind(address)
-            door.listen()
+            # Otherwise the port could not be bound for a minute after a restart.
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listener.bind(address)
+            listener.listen()
         except OSError as error:
-            door.close()
+            listener.close()
             self.close()
             raise LinkError(f"{endpoint}: cannot listen there: {because(error)}") from None
-        door.setblocking(False)
-        self._selector.register(door, selectors.EVENT_READ)
+        listener.setblocking(False)
+        self._selector.register(listener, selectors.EVENT_READ)
 
     @property
     def address(self) -> tuple[Any, ...]:
         """Local address of the listening socket: host, port, …."""
-        address: tuple[Any, ...] = self._door.getsockname()
+        address: tuple[Any, ...] = self._listener.getsockname()
         return address
 
     def _attend(self, ready: Any) -> None:
-        if ready is not self._door:
+        if ready is not self._listener:
             return
-        with suppress(OSError):  # the peer may have hung up before accept()
-            caller, _ = self._door.accept()
+        with suppress(OSError):  # the peer may have disconnected before accept()
+            connection, _ = self._listener.accept()
             if self.peers >= MOST_CALLERS:
-                caller.close()
+                connection.close()
                 return
-            with caller:
-                _quick(caller)
-                self._adopt(caller.detach())
+            with connection:
+                _configure(connection)
+                self._adopt(connection.detach())
 
     def _release(self) -> None:
-        self._door.close()
+        self._listener.close()

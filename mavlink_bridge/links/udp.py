@@ -16,13 +16,14 @@ Address = tuple[Any, ...]
 """Address as in the socket module: (host, port, …)."""
 
 REMEMBERED: Final = 10_000_000
-"""µs after its last packet for which a listening link answers a peer; the last peer is answered for ever."""
+"""µs for which a listening link sends to a peer after its last packet; to the latest peer without limit."""
 MOST_PEERS: Final = 32
+"""Largest number of peers of a listening link."""
 STEADY: Final = 3_000_000
-"""µs within which a peer must send, or a new one may take its place when there are too many."""
-_LONGEST: Final = 65536
+"""µs without a packet after which a new peer may replace the most silent of ``MOST_PEERS`` peers."""
+_MAX_PACKET_BYTES: Final = 65536
 # The default holds some 250 packets: less than a swarm sends while one plan is being solved on a busy host.
-_BUFFER: Final = 1 << 20
+_RECEIVE_BUFFER_BYTES: Final = 1 << 20
 
 
 class _Udp:
@@ -31,14 +32,14 @@ class _Udp:
     def __init__(self, receiver: socket.socket, sender: socket.socket) -> None:
         self._receiver, self._sender = receiver, sender
         self._received = self._sent = self._dropped = 0
-        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
         receiver.setblocking(False)
         sender.setblocking(False)
         self._fileno = receiver.fileno()
 
     @property
     def counters(self) -> LinkCounters:
-        """Counts; a packet to several peers is sent once."""
+        """Counts; a packet to several peers counts once."""
         return LinkCounters(self._received, self._sent, self._dropped)
 
     @property
@@ -52,13 +53,13 @@ class _Udp:
         return self._fileno
 
     def receive(self) -> list[bytes]:
-        """Return the packets that have arrived."""
+        """Return the accepted packets that have arrived, at most ``BURST``."""
         found: list[bytes] = []
         for _ in range(BURST):
             try:
-                data, source = self._receiver.recvfrom(_LONGEST)
+                data, source = self._receiver.recvfrom(_MAX_PACKET_BYTES)
             except ConnectionError:
-                continue  # an earlier packet of this end was refused: that says nothing about what arrived
+                continue  # reports that a packet sent earlier was refused; received packets may still wait
             except OSError:
                 break
             if self._accepts(source) and data:
@@ -83,7 +84,7 @@ class _Udp:
         return True
 
     def _send(self, data: bytes) -> bool:
-        """Send to the connected peer; repeat once if refused: the refusal was that of an earlier packet."""
+        """Send to the connected peer; on a refusal, repeat once, because it concerned an earlier packet."""
         for _ in range(2):
             try:
                 self._sender.send(data)
@@ -96,14 +97,14 @@ class _Udp:
 
 
 class UdpListener(_Udp):
-    """Link of ``udpin``: binds, and sends to all peers of the last 10 s, or else to the last one.
+    """Link of ``udpin``: a bound socket that sends to all peers of the last 10 s, or else to the latest one.
 
-    When there are too many peers, those that continue to send stay. Packets of a further one are received but
-    not answered: otherwise a sender with many ports could take the stream away from all others.
+    Of too many peers, those that continue to send are kept. Packets of a further peer are received, but
+    nothing is sent to it: otherwise a sender with many ports could displace all other peers.
 
-    This matches pymavlink and differs from mavlink-router's server mode, which answers the last peer only:
-    with two peers (an autopilot's two ports, a ground station and a script) each would then receive half of
-    the stream. The endpoint's own peer, if it has one, is always sent everything.
+    This matches pymavlink and differs from mavlink-router's server mode, which sends to the latest peer only:
+    of two peers (an autopilot's two ports, a ground station and a script) each would then receive half of the
+    stream. The link always sends to the endpoint's ``peer``, too, if there is one.
     """
 
     def __init__(self, endpoint: UdpIn, clock: Clock) -> None:
@@ -123,13 +124,13 @@ class UdpListener(_Udp):
 
     @property
     def peers(self) -> int:
-        """Number of peers that sent in the last 10 s."""
+        """Number of peers, at most ``MOST_PEERS``, that sent in the last 10 s."""
         now = self._clock.now()
         return sum(now - time <= REMEMBERED for time in self._peers.values())
 
     def _accepts(self, source: Address) -> bool:
-        # A new dictionary each time, because the sending thread may be iterating over the old one. The latest
-        # sender comes last.
+        # A new dictionary each time, because the sending thread may be iterating over the old one. It is
+        # sorted by time, the latest sender last.
         now = self._clock.now()
         peers = {
             peer: time for peer, time in self._peers.items() if peer != source and now - time <= REMEMBERED
@@ -180,11 +181,11 @@ class UdpCaller(_Udp):
 
 
 class MulticastLink(_Udp):
-    """Link of ``mcast``: every other member of the group receives, on this machine too.
+    """Link of ``mcast``: every other member of the group receives, on this machine, too.
 
-    The link drops its own echo. It has two sockets, because every member needs the group's port to receive,
-    but an address of its own to recognise its echo. On a loopback interface the time to live is 0: nothing
-    leaves the machine; elsewhere it is 1.
+    The link drops the echo of its own packets. It has two sockets: one bound to the group's port, to receive,
+    and one with an address of its own, by which the echo is recognised. The time to live is 0 on a loopback
+    interface, so that nothing leaves the machine; otherwise it is 1.
     """
 
     def __init__(self, endpoint: Multicast) -> None:
@@ -216,7 +217,7 @@ class MulticastLink(_Udp):
             sender.bind((endpoint.interface, 0))
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0 if local else 1)
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
-        # Connected, it has one source address, by which its echo is recognised.
+        # A connected socket has one source address, by which the echo is recognised.
         sender.connect((endpoint.group, endpoint.port))
 
     def _accepts(self, source: Address) -> bool:

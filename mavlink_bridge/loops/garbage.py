@@ -9,11 +9,12 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Final, Self
 
-_OFTEN: Final = 700
-# Number of new containers that justifies a collection: Python's own threshold.
-_MOST: Final = 100 * _OFTEN
-_RESERVE: Final = 3
-_SELDOM: Final = (200 * _OFTEN, 10, 10)
+_MIN_NEW: Final = 700
+"""Number of new containers below which nothing is collected: the default threshold of CPython 3.11."""
+_MAX_NEW: Final = 100 * _MIN_NEW
+"""Number of new containers above which a collection takes place without enough idle time."""
+_TIME_MARGIN: Final = 3
+_SELDOM_THRESHOLDS: Final = (200 * _MIN_NEW, 10, 10)
 
 
 class IdleCollector:
@@ -22,12 +23,14 @@ class IdleCollector:
     On entry all existing objects are frozen (``gc.freeze``) and automatic collection is switched off.
     ``idle`` collects within the free time that it receives. On exit the previous state is restored.
 
-    A generation is collected if the free time is at least 3 times the longest collection of that generation
-    so far. A loop that is never idle long enough collects nevertheless once 70 000 new containers exist.
+    Every tenth collection is of generation 1, every hundredth of generation 2, the others of generation 0. A
+    collection requires free time of at least 3 times the longest one of its generation so far. A loop that is
+    never idle long enough collects nevertheless once 70 000 new containers exist.
     """
 
     def __init__(self) -> None:
         self.collections = 0
+        # µs of CPU time by generation; initial estimates, which only grow.
         self._longest = [200, 500, 2000]
         self._runs = 0
         self._enabled = False
@@ -47,12 +50,12 @@ class IdleCollector:
             gc.enable()
 
     def idle(self, free: int) -> None:
-        """Collect if it fits into ``free`` µs of idle time; a negative value means that a step is overdue."""
+        """Collect if ``free`` (µs of idle time, negative if a step is overdue) suffices."""
         new = gc.get_count()[0]
-        if new < _OFTEN:
+        if new < _MIN_NEW:
             return
         generation = 2 if self._runs % 100 == 99 else 1 if self._runs % 10 == 9 else 0
-        if free < _RESERVE * self._longest[generation] and new < _MOST:
+        if free < _TIME_MARGIN * self._longest[generation] and new < _MAX_NEW:
             return
         # CPU time: a single preemption by another process does not predict the next collection.
         started = time.thread_time_ns()
@@ -65,15 +68,15 @@ class IdleCollector:
 
 @contextmanager
 def seldom_collected() -> Iterator[None]:
-    """Collect seldom while a loop under simulated time runs, because such a loop is never idle.
+    """Collect seldom within the context, for a loop under simulated time, which is never idle.
 
-    Existing objects are frozen meanwhile, and new ones are examined once there are many: the more vehicles a
-    process holds, the longer each collection takes, and there are hardly any cycles to find. On exit the
-    previous state is restored.
+    Existing objects are frozen, and the threshold of new containers is 140 000: a collection takes longer the
+    more vehicles a process holds, and there are hardly any cycles to find. On exit the thresholds are
+    restored and all objects are unfrozen.
     """
     before = gc.get_threshold()
     gc.freeze()
-    gc.set_threshold(*_SELDOM)
+    gc.set_threshold(*_SELDOM_THRESHOLDS)
     try:
         yield
     finally:

@@ -6,7 +6,7 @@ from array import array
 from typing import Final, NamedTuple
 
 _BITS: Final = 5
-_EXACT: Final = 1 << _BITS
+_BINS_PER_OCTAVE: Final = 1 << _BITS
 _OCTAVES: Final = 40
 
 
@@ -21,22 +21,23 @@ class Spread(NamedTuple):
 class Histogram:
     """Counts of non-negative integers (µs) in logarithmic bins.
 
-    A quantile is exact below 64 and at most 1/32 too high above. Values above 2^45 (a year) count as 2^45.
+    A quantile is exact below 64 and at most 1/32 too high above. All values from 2^45 µs (a year) on share
+    the last bin; ``max`` is exact.
 
-    Adding takes constant time and creates no object that a garbage collector would have to examine.
+    Adding takes constant time and creates no object that the garbage collector tracks.
     """
 
     def __init__(self) -> None:
         self.count = 0
         self.max = 0
-        self._bins = array("Q", bytes(8 * _EXACT * (_OCTAVES + 1)))
+        self._bins = array("Q", bytes(8 * _BINS_PER_OCTAVE * (_OCTAVES + 1)))
 
     def add(self, value: int) -> None:
         """Count ``value``; a negative value counts as 0."""
         value = max(value, 0)
         self.count += 1
         self.max = max(self.max, value)
-        # The octave (by how much the value exceeds 5 bits), and the 5 bits below its leading one.
+        # Floating point with an exponent (octave) and 5 bits behind the leading one; exact up to 6 bits.
         octave = max(value.bit_length() - _BITS - 1, 0)
         place = (octave << _BITS) + (value >> octave)
         self._bins[min(place, len(self._bins) - 1)] += 1
@@ -50,7 +51,10 @@ class Histogram:
                 self._bins[place] += count
 
     def quantile(self, fraction: float) -> int:
-        """Return the smallest value (or the upper end of its bin) that this ``fraction`` does not exceed."""
+        """Return the smallest value that at least ``fraction`` of the counted values do not exceed.
+
+        It is rounded up to the end of its bin, and limited to ``max``; 0 if nothing was counted.
+        """
         rank = fraction * self.count
         seen = 0
         for place, count in enumerate(self._bins):

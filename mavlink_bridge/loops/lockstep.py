@@ -1,7 +1,7 @@
 """Loop that runs nodes in lock-step under simulated time, in one process.
 
-The result is bit-identical whatever the order of the nodes. Each node may have a clock of its own, hang for a
-while, or vanish.
+The result does not depend on the order of the nodes, to the bit. Each node may have a clock of its own, be
+suspended for a while, or be removed.
 """
 
 from __future__ import annotations
@@ -22,16 +22,14 @@ __all__ = ["BUFFER", "QUANTUM", "Direction", "LockStep", "Scheduled", "StepObser
 Direction = Literal["in", "out"]
 
 BUFFER = 256
-"""Number of datagrams that wait for a hung node; about what a UDP socket holds by default on Linux."""
+"""Default input buffer of a suspended node (datagrams): about what a UDP socket holds on Linux."""
 
 
 class Scheduled(NamedTuple):
     """A node and its timing.
 
-    ``node`` is due whenever its clock shows ``phase`` + k ``period`` (µs, k an integer), for the first time
-    not before the true time ``phase``. The node receives the time that its clock shows.
-
-    Without a ``clock`` that is true time: due at ``phase``, ``phase`` + ``period``, …
+    Deadlines are at ``phase`` + k ``period`` (µs, k an integer) on the node's ``clock`` (None: true time);
+    the first is not before the true time ``phase``. The node receives the time that its clock shows.
     """
 
     node: Node
@@ -47,27 +45,30 @@ class StepObserver(Protocol):
     """
 
     def begin(self, now: int, node: str, /) -> None:
-        """Announce the step of ``node`` at ``now``; the datagrams that enter and leave it then follow."""
+        """Observe the beginning of a step of ``node`` at ``now`` (µs of the node's clock).
+
+        Calls for the datagrams of the step follow: first those that enter, then those that leave.
+        """
         ...
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        """Observe a datagram at ``now`` (µs) of the node's clock; true time is the loop's ``now``."""
+        """Observe a datagram of the step at ``now`` (µs of the node's clock)."""
         ...
 
 
 class LockStep:
     """Loop that steps ``scheduled`` nodes over ``network`` in simulated time.
 
-    All times are µs; periods and phases are whole multiples of ``base_tick``, which is a multiple of 4 µs.
-    For a hung node up to ``buffer`` datagrams wait.
+    All times are in µs. Periods and phases are whole multiples of ``base_tick``, which is a multiple of 4 µs.
+    The input buffer of a suspended node holds up to ``buffer`` datagrams. ``taps`` observe all steps.
 
-    Within a tick all due nodes first receive, then all step, then everything is sent: no node sees another's
-    output of the same tick. A node whose clock deviates from true time is due at the first tick at which its
-    clock shows the deadline or more, so its steps drift relative to those of the others; a tick steps it at
-    most once.
+    Within a tick all due nodes first receive, then all step, then everything is sent: no node receives the
+    output of another node from the same tick. A node whose clock deviates from true time is due at the first
+    tick at which its clock shows at least the deadline; its steps therefore drift relative to those of the
+    other nodes. A tick steps a node at most once.
 
-    Raises ScheduleError for periods or phases off the grid, for names used twice, and for a clock that shows
-    a negative time.
+    Raises ScheduleError for an invalid tick, period or phase, for a name used twice, and for a clock that
+    shows a negative time at the node's phase.
     """
 
     def __init__(
@@ -91,28 +92,31 @@ class LockStep:
                     f"{node.name}: period = {period} µs is not a positive multiple of {base_tick} µs"
                 )
             if phase < 0 or phase % base_tick:
-                raise ScheduleError(f"{node.name}: phase = {phase} µs is not a multiple of {base_tick} µs")
+                raise ScheduleError(
+                    f"{node.name}: phase = {phase} µs is not 0 or a positive multiple of {base_tick} µs"
+                )
         for one, following in pairwise(entries):
             if one.node.name == following.node.name:
                 raise ScheduleError(f"two nodes are named {one.node.name!r}")
-        self._slots = [Schedule(*entry, base_tick) for entry in entries]
-        # Remaining buffer capacity of each hung node.
-        self._hanging: dict[str, int] = {}
+        self._schedules = [Schedule(*entry, base_tick) for entry in entries]
+        # Input buffer capacity (datagrams) of each suspended node; 0 for a removed one.
+        self._suspended: dict[str, int] = {}
         self._vanished: set[str] = set()
-        # The index breaks ties by name, so that taps are called in one order whatever the order given.
-        self._due = [(slot.first(), index) for index, slot in enumerate(self._slots)]
+        # Entries are sorted by name, so the index breaks ties by name: the order of calls to the taps does
+        # not depend on the order of ``scheduled``.
+        self._due = [(schedule.first(), index) for index, schedule in enumerate(self._schedules)]
         heapify(self._due)
 
     @property
     def now(self) -> int:
-        """Time (µs, true time) before which every tick has been run."""
+        """True time (µs); every tick before it has been run, none at or after it."""
         return self._now
 
     def run(self, until: int, on_tick: Callable[[int], bool | None] | None = None) -> None:
         """Run all ticks before ``until`` (µs), starting at the loop's ``now``.
 
         ``run(a); run(b)`` is the same as ``run(b)``. Ticks on which no node is due are skipped.
-        ``on_tick(time)`` is called after each tick that was run; if it returns True the run ends there.
+        ``on_tick(time)`` is called after each tick that was run; if it returns True, the run ends.
         """
         due = self._due
         while due and due[0][0] < until:
@@ -124,77 +128,81 @@ class LockStep:
         self._now = max(self._now, until)
 
     def freeze(self, name: str) -> None:
-        """Suspend node ``name``: it is not stepped, and what arrives for it waits in its buffer.
+        """Suspend node ``name``: it is not stepped, and arriving datagrams wait in its input buffer.
 
         When the buffer is full, new datagrams are dropped. The node's clock continues. Raises ScheduleError
         for an unknown name.
         """
         self._index_of(name)
-        self._hanging.setdefault(name, self._buffer)
+        self._suspended.setdefault(name, self._buffer)
 
     def thaw(self, name: str) -> None:
-        """Resume node ``name`` at its next deadline with all datagrams that waited.
+        """Resume node ``name`` at its next deadline; that step receives all buffered datagrams.
 
-        Missed deadlines are not made up for. The call has no effect on a node that has vanished. Raises
-        ScheduleError for an unknown name.
+        Missed deadlines are skipped. The call has no effect on a removed node. Raises ScheduleError for an
+        unknown name.
         """
         self._index_of(name)
         if name not in self._vanished:
-            self._hanging.pop(name, None)
+            self._suspended.pop(name, None)
 
     def vanish(self, name: str) -> None:
-        """Remove node ``name`` for good: it is never stepped again, and all its input is dropped.
+        """Remove node ``name`` permanently: it is never stepped again, and its input is dropped.
 
         Raises ScheduleError for an unknown name.
         """
         self._index_of(name)
-        self._hanging[name] = 0
+        self._suspended[name] = 0
         self._vanished.add(name)
 
     def _index_of(self, name: str) -> int:
-        names = [slot.name for slot in self._slots]
+        """Return the index of node ``name``; raise ScheduleError if there is none."""
+        names = [schedule.name for schedule in self._schedules]
         if name not in names:
             raise ScheduleError(f"no node is named {name!r}; there are {', '.join(names)}")
         return names.index(name)
 
     def _pop_due(self, now: int) -> list[Schedule]:
-        due, slots = self._due, []
+        due, schedules = self._due, []
         while due[0][0] == now:
             index = due[0][1]
-            slot = self._slots[index]
-            heapreplace(due, (slot.after(now), index))
-            slots.append(slot)
-        return slots
+            schedule = self._schedules[index]
+            heapreplace(due, (schedule.after(now), index))
+            schedules.append(schedule)
+        return schedules
 
-    def _tick(self, now: int, slots: list[Schedule]) -> None:
+    def _tick(self, now: int, schedules: list[Schedule]) -> None:
         network = self._network
-        if self._hanging:
-            slots = self._running(now, slots)
-        times = [slot.told(now) for slot in slots]
-        inboxes = [network.receive(now, slot.name) for slot in slots]
+        if self._suspended:
+            schedules = self._running(now, schedules)
+        times = [schedule.told(now) for schedule in schedules]
+        inboxes = [network.receive(now, schedule.name) for schedule in schedules]
         if self._taps:
-            self._show(times, slots, "in", inboxes)
-        outboxes = [slot.step(time, inbox) for slot, time, inbox in zip(slots, times, inboxes, strict=True)]
+            self._show(times, schedules, "in", inboxes)
+        outboxes = [
+            schedule.step(time, inbox)
+            for schedule, time, inbox in zip(schedules, times, inboxes, strict=True)
+        ]
         if self._taps:
-            self._show(times, slots, "out", outboxes)
-        for slot, outbox in zip(slots, outboxes, strict=True):
+            self._show(times, schedules, "out", outboxes)
+        for schedule, outbox in zip(schedules, outboxes, strict=True):
             if outbox:
-                network.send(now, slot.name, outbox)
+                network.send(now, schedule.name, outbox)
 
-    def _running(self, now: int, slots: list[Schedule]) -> list[Schedule]:
-        """Return those of ``slots`` that are not hung; for the others, buffer what has arrived."""
-        for slot in slots:
-            room = self._hanging.get(slot.name)
+    def _running(self, now: int, schedules: list[Schedule]) -> list[Schedule]:
+        """Return the schedules of nodes that are not suspended; buffer arrivals for the suspended ones."""
+        for schedule in schedules:
+            room = self._suspended.get(schedule.name)
             if room is not None:
-                self._network.keep(now, slot.name, room)
-        return [slot for slot in slots if slot.name not in self._hanging]
+                self._network.keep(now, schedule.name, room)
+        return [schedule for schedule in schedules if schedule.name not in self._suspended]
 
     def _show(
-        self, times: list[int], slots: list[Schedule], direction: Direction, boxes: list[list[Datagram]]
+        self, times: list[int], schedules: list[Schedule], direction: Direction, boxes: list[list[Datagram]]
     ) -> None:
         for tap in self._taps:
-            for time, slot, box in zip(times, slots, boxes, strict=True):
+            for time, schedule, box in zip(times, schedules, boxes, strict=True):
                 if direction == "in":
-                    tap.begin(time, slot.name)
+                    tap.begin(time, schedule.name)
                 for datagram in box:
-                    tap(time, slot.name, direction, datagram)
+                    tap(time, schedule.name, direction, datagram)

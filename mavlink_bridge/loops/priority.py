@@ -23,7 +23,7 @@ _HINT: Final = (
 class Priority(NamedTuple):
     """Privileges that the system granted.
 
-    ``told`` reports them in a sentence, with the remedy if a request was refused.
+    ``told`` reports them in words, with the remedy if a request was refused.
     """
 
     realtime: bool
@@ -32,9 +32,9 @@ class Priority(NamedTuple):
 
 
 def ask_for_priority(level: int = LEVEL) -> Priority:
-    """Request SCHED_FIFO at ``level``, locked pages and timers without slack, for this and later threads.
+    """Request SCHED_FIFO at ``level``, locked pages and 1 µs of timer slack, for this and later threads.
 
-    Refused requests are left out of the result. Call this before any other thread is started: a thread of
+    A refusal raises nothing; the result reports it. Call this before any other thread is started: a thread of
     lower priority that holds the interpreter lock would hold up all others.
     """
     sharpen_timers()
@@ -74,9 +74,9 @@ def _fifo(level: int) -> str | None:
 
 
 def _lock_memory() -> bool:
-    """Lock pages as they come into use, and only if the limit can be lifted.
+    """Lock pages as they come into use if the limit can be lifted; return whether they are locked.
 
-    Under a limit, memory would run out in flight.
+    Under a limit, allocations would fail in flight.
     """
     if sys.platform != "linux":
         return False

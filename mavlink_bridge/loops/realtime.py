@@ -16,20 +16,20 @@ from mavlink_bridge.loops.inbox import CAPACITY, Inbox
 from mavlink_bridge.loops.lockstep import Direction, Scheduled, StepObserver
 from mavlink_bridge.node import Datagram
 
-_NAP: Final = 100_000
-# µs; a request to stop takes effect after at most this time and one step.
+_STOP_POLL_US: Final = 100_000
+"""A request to stop takes effect after at most this time and one step."""
 
 
 class Statistics(NamedTuple):
     """Statistics of a run.
 
     - ``steps``: all steps that were not excused
-    - ``misses``: steps that began too late
-    - ``skipped``: deadlines without a step
+    - ``misses``: steps that began more than the tolerance late
+    - ``skipped``: deadlines without a step, except those skipped by excused steps
     - ``lateness``: from the deadline to the beginning of a step (µs)
-    - ``busy``: from the beginning to the end of a step, with receiving, sending and taps (µs)
+    - ``busy``: from the beginning to the end of a step, with receiving, sending, taps and ``on_step`` (µs)
     - ``overruns``: datagrams dropped because too many waited
-    - ``unrouted``: datagrams for a link that is not connected
+    - ``unrouted``: datagrams sent to a link name that ``links`` lacks
     """
 
     steps: int
@@ -44,18 +44,18 @@ class Statistics(NamedTuple):
 class RealTime:
     """Loop that steps ``scheduled.node`` at phase + k period (µs).
 
-    It starts at the first such instant that is not past, on ``clock``, or on the node's own clock if
-    ``scheduled`` has one. The node receives the deadline, not the instant at which it really runs, which is
-    less than a period later. So the node's own periods divide evenly, and the low two bits of every time are
-    free for a tlog's link.
+    Deadlines are on the node's own clock if ``scheduled`` has one, otherwise on ``clock``. The first is the
+    earliest that is neither past nor before the phase. The node receives the deadline, not the instant at
+    which the step begins, less than a period later. So the node's own periods divide evenly, and the low two
+    bits of every time are free for a tlog's link.
 
     ``links`` maps the node's name for a link to one or several links; what the node sends goes to all of
     them. The loop owns the links and closes them at the end. After each step the loop calls ``on_idle(µs)``
-    with the time until the next deadline. Before each step it calls ``excused()``, which returns whether the
-    step was held up on purpose; the lateness of such a step is not counted. See ``Deadlines`` for
-    ``tolerance``, ``Inbox`` for ``capacity``.
+    with the time until the next deadline, negative if it has passed. Before each step it calls ``excused()``,
+    which returns whether the step was delayed on purpose; the lateness of such a step is not counted. See
+    ``Deadlines`` for ``tolerance``, ``Inbox`` for ``capacity``.
 
-    Raises ScheduleError for periods and phases off the grid.
+    Raises ScheduleError for an invalid period or phase.
     """
 
     def __init__(
@@ -109,8 +109,8 @@ class RealTime:
     ) -> Statistics:
         """Run until ``stop()`` or ``on_step(now)`` returns True, and return the statistics.
 
-        ``stop`` is called before every step, from this thread; ``on_step`` after every step, with true time.
-        The loop runs only once: the links are closed however it ends.
+        This thread calls ``stop`` before every step and every 100 ms while it waits, and ``on_step`` after
+        every step, with the deadline in true time. The loop runs only once: it closes the links in any case.
         """
         clock, due = self._clock, self.deadlines
         with ExitStack() as cleanup:
@@ -137,14 +137,14 @@ class RealTime:
         return self.statistics
 
     def _wait(self, deadline: int, stop: Callable[[], bool]) -> bool:
-        """Wait until ``deadline``; return False if the loop shall stop."""
+        """Wait until ``deadline``; return False, possibly before it, if the loop shall stop."""
         clock = self._clock
         while not stop():
-            nap = clock.now() + _NAP
-            if nap >= deadline:
+            pause_end = clock.now() + _STOP_POLL_US
+            if pause_end >= deadline:
                 clock.wait_until(deadline)
                 return not stop()
-            clock.wait_until(nap)
+            clock.wait_until(pause_end)
         return False
 
     def _step(self, now: int, inbox: Inbox) -> None:

@@ -10,8 +10,8 @@ from mavlink_bridge.node import Node
 class Schedule:
     """A node's deadlines: ``phase`` + k ``period`` (µs) on its own ``clock`` (None: true time).
 
-    Each deadline is met at the first multiple of ``tick`` (µs, true time) at which the clock shows it or
-    more. Raises ScheduleError for a clock that shows a negative time at ``phase``.
+    The node is due at the first multiple of ``tick`` (µs, true time) at which its clock shows at least the
+    deadline. Raises ScheduleError for a clock that shows a negative time at ``phase``.
     """
 
     __slots__ = ("_clock", "_period", "_phase", "_tick", "name", "step")
@@ -28,7 +28,7 @@ class Schedule:
     def after(self, true: int) -> int:
         """Return the tick (µs, true time) of the first deadline that the clock does not show yet at ``true``.
 
-        Without a clock, ``true`` must be a tick at which the node is due. No deadline is met twice.
+        Without a clock, ``true`` must be a tick at which the node is due.
         """
         if self._clock is None:
             return true + self._period
@@ -39,7 +39,7 @@ class Schedule:
     def told(self, true: int) -> int:
         """Return the time (µs) that the node receives when it is stepped at ``true``.
 
-        It is later than the previous one, because a deadline lies between the two.
+        It is later than the time of the previous step, because a deadline lies between them.
         """
         return true if self._clock is None else self._clock.local(true)
 
@@ -47,6 +47,6 @@ class Schedule:
         shown = clock.local(true)
         if shown < 0:
             raise ScheduleError(
-                f"{self.name}: its clock shows {shown} µs at {true} µs; a node is told 0 µs or more"
+                f"{self.name}: its clock shows {shown} µs at {true} µs; a node needs a time of 0 µs or more"
             )
         return clock

@@ -1,4 +1,4 @@
-"""Messages of commands: COMMAND_INT, COMMAND_LONG, their answer, mode and rates of messages."""
+"""Messages of commands: COMMAND_INT, COMMAND_LONG, their acknowledgement, mode and rates of messages."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class CommandAck(NamedTuple):
 
 @message("SET_MODE")
 class SetMode(NamedTuple):
-    """SET_MODE (11), which older tools send instead of a command."""
+    """SET_MODE (11), which older tools send instead of MAV_CMD_DO_SET_MODE."""
 
     source: Source
     custom_mode: int

@@ -1,8 +1,8 @@
-"""Declaration of a MAVLink message: one class, which converts its fields to a payload and back.
+"""Declaration of a MAVLink message: one class, with the conversion of its fields to a payload and back.
 
-``message`` is the decorator of these classes. The dialect that pymavlink generated gives ids, CRC_EXTRA,
-field order and struct; the class has the SI values. The tables of all messages are complete as soon as the
-package ``messages`` is imported.
+``message`` is the decorator of these classes. pymavlink's generated dialect gives ids, CRC_EXTRA, field order
+and struct; the class has the SI values. Importing the package ``messages`` fills the tables ``BY_ID`` and
+``BY_TYPE`` with all messages.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class Converter(NamedTuple):
     """Conversion of one message to its payload and back.
 
     ``decode`` builds a message from the fields in wire order, or returns None if a field is invalid;
-    ``encode`` is the reverse. ``finite``: a NaN or infinity anywhere is an error (state messages); otherwise
-    it has a meaning and is kept (commands). ``size_v1``: payload bytes without extension fields.
+    ``encode`` is the reverse. ``finite``: a NaN or infinity in any field is an error; otherwise it is kept,
+    as it may mean *ignored* or *unknown*. ``size_v1``: payload bytes without extension fields.
     """
 
     message: type[Message]
@@ -62,7 +62,7 @@ class Converter(NamedTuple):
     finite: bool
 
     def parse(self, source: Source, payload: bytes) -> Message | None:
-        """Decode a payload of any length (padded with zeros, or cut); return None if it is bad."""
+        """Decode a payload of any length (it is padded with zeros, or cut); return None if it is invalid."""
         size = self.struct.size
         fields = self.struct.unpack(payload[:size] if len(payload) >= size else payload.ljust(size, b"\0"))
         if self.finite and not isfinite(sum(fields)):
@@ -86,7 +86,11 @@ class Converter(NamedTuple):
                     if isinstance(number, Real) and not isfinite(number):
                         return EncodeError(f"{self.name}: {name} = {number} is not finite")
         codes = _CODE.findall(self.struct.format)
-        for name, code, value in zip(self.field_names, codes, self.encode(message), strict=True):
+        try:
+            values = self.encode(message)
+        except (OverflowError, ValueError) as error:
+            return EncodeError(f"{self.name}: {message} has no value on the wire: {error}")
+        for name, code, value in zip(self.field_names, codes, values, strict=True):
             try:
                 Struct("<" + code).pack(value)
             except (OverflowError, StructError):
@@ -108,11 +112,11 @@ def message(
     layout: str | None = None,
     more: tuple[str, ...] = (),
 ) -> Callable[[M], M]:
-    """Declare a class of named tuples as the values of the MAVLink message ``name``.
+    """Return the decorator that declares a NamedTuple class as the values of the MAVLink message ``name``.
 
     The class may define ``decode(source, fields)``, a static method that returns a message, or None if a
-    field is invalid, and ``encode()``, which returns the fields or raises EncodeError. By default both leave
-    the fields as they are: in wire order, in MAVLink's units.
+    field is invalid, and ``encode()``, which returns the fields or raises EncodeError. By default the values
+    are the fields unchanged: in wire order, in MAVLink's units.
 
     ``finite`` is as in ``Converter``. ``size_v1`` is required where there are extension fields: the generated
     classes do not mark them. ``layout`` replaces the dialect's, with ``more`` extension fields that the
@@ -152,9 +156,9 @@ def _as_they_are(values: tuple[Any, ...]) -> Fields:
 
 
 def _codes(layout: str) -> list[str]:
-    """Return the struct codes of each field of ``layout``, a code for each value.
+    """Return for each field of ``layout`` its struct codes, one code for each value.
 
-    ``4f`` becomes four values; ``16s`` is one, and so are the 16 bytes of ``16B``.
+    ``4f`` becomes ``ffff``, four values. ``16s`` is one value of 16 bytes, and so is ``16B``.
     """
     fields = _CODE.findall(re.sub(r"(\d+)B", r"\1s", layout))
     return [field if field.endswith("s") else field[-1] * int(field[:-1] or 1) for field in fields]

@@ -1,7 +1,7 @@
 """Conversions of fields that several messages share.
 
-degE7 ↔ degrees (float64), mm, cm/s, mV, % ↔ m, m/s, V, 0…1; cdeg ↔ rad; ms ↔ µs (the rest is lost); markers
-of *unknown* ↔ None.
+All messages convert degE7 ↔ degrees (float64), mm, cm/s, mV, % ↔ m, m/s, V, 0…1, cdeg ↔ rad, ms ↔ µs (rounded
+down to ms), and markers of *unknown* ↔ None.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ FULL_CIRCLE_CDEG = 36000
 
 
 def degrees_e7(latitude: float, longitude: float) -> tuple[int, int]:
-    """Return both (degrees) as degE7; raise EncodeError beyond ±90° and ±180°."""
+    """Return latitude and longitude (degrees) in degE7; raise EncodeError beyond ±90° and ±180°."""
     for name, value, limit in (("latitude", latitude, 90), ("longitude", longitude, 180)):
         if abs(value) > limit:
             raise EncodeError(f"{name} = {value} is outside ±{limit}°")
@@ -26,7 +26,7 @@ def degrees_e7(latitude: float, longitude: float) -> tuple[int, int]:
 
 
 def on_globe(latitude_e7: int, longitude_e7: int) -> bool:
-    """Return whether the position (degE7) exists."""
+    """Return whether latitude and longitude (degE7) are within ±90° and ±180°."""
     return abs(latitude_e7) <= 900_000_000 and abs(longitude_e7) <= 1_800_000_000
 
 
@@ -54,13 +54,16 @@ def or_unknown(name: str, value: float | None, scale: float) -> int:
 
 
 def ascii_text(field: bytes) -> str:
-    """Decode ASCII up to the first NUL; other characters become question marks, as in ``ascii_bytes``."""
+    """Decode ASCII up to the first NUL; each non-ASCII byte becomes a question mark."""
     return field.split(b"\0", 1)[0].decode("ascii", errors="replace").replace("\ufffd", "?")
 
 
-def ascii_bytes(name: str, text: str, most: int) -> bytes:
-    """Encode ``text`` in ASCII; raise EncodeError if it is longer than ``most`` characters."""
+def ascii_bytes(name: str, text: str, max_length: int) -> bytes:
+    """Encode ``text`` in ASCII, other characters as question marks.
+
+    Raises EncodeError if it is longer than ``max_length`` characters.
+    """
     data = text.encode("ascii", errors="replace")
-    if len(data) > most:
-        raise EncodeError(f"{name} = {text!r} is longer than {most} characters")
+    if len(data) > max_length:
+        raise EncodeError(f"{name} = {text!r} is longer than {max_length} characters")
     return data

@@ -31,7 +31,7 @@ class SystemTime(NamedTuple):
 
 @message("PING")
 class Ping(NamedTuple):
-    """PING (4)."""
+    """PING (4); ``time``: µs, Unix time or time since boot."""
 
     source: Source
     time: int

@@ -1,7 +1,7 @@
 """Messages of the mission protocol: transfer of missions, fences and rally points in both directions.
 
-``mission_type`` is MAV_MISSION_TYPE. ``opaque_id`` identifies the plan that the vehicle holds; 0 when it has
-none.
+``mission_type`` is MAV_MISSION_TYPE. ``opaque_id`` identifies the plan that the vehicle holds; 0 without a
+plan.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ class MissionSetCurrent(NamedTuple):
 class MissionCurrent(NamedTuple):
     """MISSION_CURRENT (42).
 
-    ``total`` is the last item, 65535 without a mission; ``state`` is MISSION_STATE; ``mode`` is 1 in mission
-    mode, 2 out of it; the ids of the three plans follow.
+    ``total`` is the number of the last item, 65535 without a mission; ``state`` is MISSION_STATE;
+    ``mode`` is 1 in mission mode, 2 out of it; the ids of the three plans follow.
     """
 
     source: Source

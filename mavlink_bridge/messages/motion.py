@@ -12,7 +12,8 @@ from mavlink_bridge.messages.source import Source, Vector
 # Bits of FOLLOW_TARGET.est_capabilities.
 HAS_POSITION = 0x1
 HAS_VELOCITY = 0x2
-_IDENTITY = (0.0, 0.0, 0.0, 0.0)
+# ATTITUDE_QUATERNION.repr_offset_q; zeros mean that there is no offset.
+_NO_OFFSET = (0.0, 0.0, 0.0, 0.0)
 
 
 @message("ATTITUDE", finite=True)
@@ -49,12 +50,12 @@ class AttitudeQuaternion(NamedTuple):
         return AttitudeQuaternion(source, fields[0] * 1000, fields[1:5], fields[5:8])
 
     def encode(self) -> Fields:
-        return self.time_boot // 1000, *self.attitude, *self.body_rates, *_IDENTITY
+        return self.time_boot // 1000, *self.attitude, *self.body_rates, *_NO_OFFSET
 
 
 @message("LOCAL_POSITION_NED", finite=True)
 class LocalPosition(NamedTuple):
-    """LOCAL_POSITION_NED (32), relative to the sender's *own* origin; never compare those of two vehicles."""
+    """LOCAL_POSITION_NED (32), relative to the sender's *own* origin: not comparable between vehicles."""
 
     source: Source
     time_boot: int
@@ -119,7 +120,7 @@ class GlobalPosition(NamedTuple):
 
 @message("ALTITUDE")
 class Altitude(NamedTuple):
-    """ALTITUDE (141): m; NaN for altitudes that are not measured; ``time`` µs since boot."""
+    """ALTITUDE (141): altitudes in m, NaN if not measured; ``time`` µs since boot."""
 
     source: Source
     time: int
@@ -133,7 +134,7 @@ class Altitude(NamedTuple):
 
 @message("VFR_HUD", finite=True)
 class VfrHud(NamedTuple):
-    """VFR_HUD (74): speeds in m/s, altitude above mean sea level, ``heading`` 0…2π, ``throttle`` 0…1."""
+    """VFR_HUD (74): speeds m/s, altitude m above mean sea level, ``heading`` rad 0…2π, ``throttle`` 0…1."""
 
     source: Source
     airspeed: float

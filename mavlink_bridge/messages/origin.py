@@ -1,4 +1,4 @@
-"""Messages of fixed places: origin of the local frame, home."""
+"""Messages of fixed places: origin of the local frame, home. Altitudes in m above mean sea level."""
 
 from __future__ import annotations
 
@@ -109,13 +109,13 @@ class SetHomePosition(NamedTuple):
 def _home(
     fields: Fields,
 ) -> tuple[float, float, float, Vector, tuple[float, float, float, float], Vector] | None:
-    """Return what both messages of home have in common, from latitude to approach; None beyond the globe."""
+    """Return the values that both messages of home share, latitude to approach; None for an invalid place."""
     if not on_globe(fields[0], fields[1]):
         return None
     return fields[0] / 1e7, fields[1] / 1e7, fields[2] / 1e3, fields[3:6], fields[6:10], fields[10:13]
 
 
 def _home_fields(home: HomePosition | SetHomePosition) -> Fields:
-    """Return the fields that both messages of home have in common: the first thirteen."""
+    """Return the fields that both messages of home share: the first thirteen."""
     place = *degrees_e7(home.latitude, home.longitude), round(home.altitude * 1e3)
     return *place, *home.position_ned, *home.attitude, *home.approach

@@ -21,7 +21,7 @@ def _four(raw: bytes) -> bytes:
 
 @message("PARAM_REQUEST_READ")
 class ParamRequestRead(NamedTuple):
-    """PARAM_REQUEST_READ (20): by ``number``, or by ``name`` if that is −1."""
+    """PARAM_REQUEST_READ (20): by ``number``, or by ``name`` if ``number`` is −1."""
 
     source: Source
     number: int
@@ -107,7 +107,7 @@ class ParamSet(NamedTuple):
 
 @message("FILE_TRANSFER_PROTOCOL")
 class FileTransfer(NamedTuple):
-    """FILE_TRANSFER_PROTOCOL (110): 251 bytes of MAVLink FTP."""
+    """FILE_TRANSFER_PROTOCOL (110): up to 251 bytes of MAVLink FTP (received ones: padded to 251)."""
 
     source: Source
     target_network: int

@@ -28,8 +28,8 @@ _ALL_UPDATED = 0x1FFF
 class GpsRaw(NamedTuple):
     """GPS_RAW_INT (24).
 
-    ``time`` µs since boot; ``hdop``, ``vdop`` dilutions; ``speed`` over ground and ``course`` (clockwise from
-    north); the three accuracies in m, m and m/s, 0 when not known.
+    ``time`` µs since boot; ``hdop``, ``vdop``: dilutions of precision; ``speed`` (m/s) and ``course`` (rad
+    clockwise from north) over ground; the three accuracies in m, m and m/s, 0 if unknown.
     """
 
     source: Source
@@ -93,7 +93,10 @@ class GpsRaw(NamedTuple):
 
 @message("RAW_IMU", size_v1=26)
 class RawImu(NamedTuple):
-    """RAW_IMU (27): specific force (m/s², FRD), body rates (rad/s) and magnetic field (gauss)."""
+    """RAW_IMU (27): specific force (m/s²), body rates (rad/s), magnetic field (gauss); all in body FRD.
+
+    ``time_boot`` µs. The encoder saturates at int16, as a sensor does.
+    """
 
     source: Source
     time_boot: int
@@ -104,8 +107,8 @@ class RawImu(NamedTuple):
     @staticmethod
     def decode(source: Source, fields: Fields) -> RawImu:
         x, y, z = (value * _MILLI_G for value in fields[1:4])
-        p, q, r, north, east, down = (value / 1e3 for value in fields[4:10])
-        return RawImu(source, fields[0], (x, y, z), (p, q, r), (north, east, down))
+        p, q, r, mx, my, mz = (value / 1e3 for value in fields[4:10])
+        return RawImu(source, fields[0], (x, y, z), (p, q, r), (mx, my, mz))
 
     def encode(self) -> Fields:
         force = (int16(value / _MILLI_G) for value in self.specific_force)

@@ -11,7 +11,7 @@ from mavlink_bridge.messages.source import Source, Vector
 
 @message("SET_POSITION_TARGET_LOCAL_NED")
 class SetpointLocal(NamedTuple):
-    """SET_POSITION_TARGET_LOCAL_NED (84) as sent, including ignored fields (they may hold NaN)."""
+    """SET_POSITION_TARGET_LOCAL_NED (84) as sent, including ignored fields, which may hold NaN."""
 
     source: Source
     time_boot: int

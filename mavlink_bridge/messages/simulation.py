@@ -14,7 +14,7 @@ from mavlink_bridge.messages.source import Source, Vector
 class SimState(NamedTuple):
     """SIMSTATE (164, ardupilotmega): ground truth of a simulation.
 
-    Euler angles (rad), specific force (m/s², FRD), body rates (rad/s), degrees.
+    Euler angles (rad), specific force (m/s², FRD), body rates (rad/s), latitude and longitude (degrees).
     """
 
     source: Source
@@ -40,9 +40,9 @@ class SimState(NamedTuple):
 
 @message("SIM_STATE", finite=True, size_v1=84)
 class SimulationState(NamedTuple):
-    """SIM_STATE (108): ground truth of a simulation, without time; ArduPilot's sends it on request.
+    """SIM_STATE (108): ground truth without a time stamp; ArduPilot's simulation sends it on request.
 
-    Degrees, altitude above mean sea level (m, float32), velocity (m/s).
+    Latitude and longitude (degrees), altitude above mean sea level (m, float32), velocity (m/s).
     """
 
     source: Source
@@ -54,7 +54,7 @@ class SimulationState(NamedTuple):
     @staticmethod
     def decode(source: Source, fields: Fields) -> SimulationState | None:
         latitude, longitude = fields[21:]
-        # Float degrees have a resolution of half a metre: only where the extension fields are missing.
+        # The float32 degrees resolve only about a metre; they are used if the extension fields are missing.
         if not (latitude or longitude):
             if not (isfinite(fields[13]) and isfinite(fields[14])):
                 return None
@@ -73,7 +73,7 @@ class SimulationState(NamedTuple):
 class HilState(NamedTuple):
     """HIL_STATE_QUATERNION (115): ground truth of PX4's simulation in hardware (SIH).
 
-    ``time`` µs since boot; velocity in steps of 1 cm/s.
+    ``time`` µs since boot; altitude m above mean sea level; velocity m/s in steps of 1 cm/s.
     """
 
     source: Source

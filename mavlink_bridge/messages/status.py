@@ -11,7 +11,7 @@ from mavlink_bridge.messages.fields import UNKNOWN_U16, Fields, or_unknown
 from mavlink_bridge.messages.source import Source
 
 _CELLS = 10
-_AMPERE_SECONDS = 3.6  # ampere seconds in 1 mA h
+_AMPERE_SECONDS_PER_MAH = 3.6
 TEXT_LENGTH = 50
 
 
@@ -37,7 +37,7 @@ class Heartbeat(NamedTuple):
 
 @message("SYS_STATUS", finite=True, size_v1=31)
 class SysStatus(NamedTuple):
-    """SYS_STATUS (1): sensor bit masks and battery; ``battery_remaining`` in 0…1 or None."""
+    """SYS_STATUS (1): sensor bit masks; battery voltage (V) and remaining charge (0…1), None if unknown."""
 
     source: Source
     present: int
@@ -77,8 +77,9 @@ class SysStatus(NamedTuple):
 class BatteryStatus(NamedTuple):
     """BATTERY_STATUS (147).
 
-    ``voltages`` (V) of up to ten cells, or that of all in the first; ``current`` (A); ``consumed`` (A s);
-    ``remaining`` 0…1; ``time_remaining`` (s, 0 when not known); ``charge_state`` is MAV_BATTERY_CHARGE_STATE.
+    ``voltages`` (V) of up to ten cells, or the total voltage as the only one; ``current`` (A); ``consumed``
+    (A s); ``remaining`` 0…1; ``time_remaining`` (s, 0 if unknown); ``charge_state`` is
+    MAV_BATTERY_CHARGE_STATE.
     """
 
     source: Source
@@ -103,7 +104,7 @@ class BatteryStatus(NamedTuple):
             fields[16],
             voltages,
             None if current == -1 else current / 100,
-            None if consumed == -1 else consumed * _AMPERE_SECONDS,
+            None if consumed == -1 else consumed * _AMPERE_SECONDS_PER_MAH,
             remaining / 100 if 0 <= remaining <= 100 else None,
             fields[18],
             fields[19],
@@ -117,7 +118,7 @@ class BatteryStatus(NamedTuple):
         if not -1 <= remaining <= 100:
             raise EncodeError(f"BATTERY_STATUS: remaining = {self.remaining} is outside 0…1")
         return (
-            -1 if self.consumed is None else round(self.consumed / _AMPERE_SECONDS),
+            -1 if self.consumed is None else round(self.consumed / _AMPERE_SECONDS_PER_MAH),
             -1,
             0x7FFF,
             *cells,
@@ -165,7 +166,7 @@ class FenceStatus(NamedTuple):
 class EkfStatus(NamedTuple):
     """EKF_STATUS_REPORT (193, ardupilotmega).
 
-    Bit mask of ESTIMATOR flags; ratios of innovations to their gates (below 1 is good).
+    ``flags`` are EKF_STATUS_FLAGS; the rest are innovation test ratios (innovation over gate; good below 1).
     """
 
     source: Source
@@ -187,8 +188,8 @@ class EkfStatus(NamedTuple):
 class EstimatorStatus(NamedTuple):
     """ESTIMATOR_STATUS (230).
 
-    Ratios of innovations to their gates (below 1 is good, NaN not tested), accuracies (m),
-    ESTIMATOR_STATUS_FLAGS. ``time`` µs since boot.
+    Innovation test ratios (PX4: squares of innovation over gate; good below 1, NaN if not tested), accuracies
+    (m), ESTIMATOR_STATUS_FLAGS. ``time`` µs since boot.
     """
 
     source: Source
@@ -206,7 +207,7 @@ class EstimatorStatus(NamedTuple):
 
 @message("STATUSTEXT", size_v1=51)
 class StatusText(NamedTuple):
-    """STATUSTEXT (253): ``text`` at most 50 characters here; the encoder splits longer texts."""
+    """STATUSTEXT (253): one message carries 50 characters; ``Codec.encode`` splits a longer ``text``."""
 
     source: Source
     severity: int
@@ -224,8 +225,8 @@ class StatusText(NamedTuple):
 class AutopilotVersion(NamedTuple):
     """AUTOPILOT_VERSION (148).
 
-    ``capabilities`` are MAV_PROTOCOL_CAPABILITY; versions are four bytes, the most significant first; custom
-    versions have eight bytes, ``uid2`` has 18.
+    ``capabilities`` are MAV_PROTOCOL_CAPABILITY. A version number has four bytes, the major version in the
+    most significant one. Custom versions have eight bytes, ``uid2`` has 18.
     """
 
     source: Source
@@ -252,10 +253,9 @@ def text_bytes(text: str) -> bytes:
 
 
 def text_chunks(text: str) -> list[bytes]:
-    """Split ``text`` into at most 255 pieces of at most 50 bytes.
+    """Split ``text`` into at most 255 pieces (their number is one byte) of 50 bytes; cut a longer text.
 
-    The last one is shorter, because its NUL tells the receiver that the text is complete. The number of a
-    piece is one byte.
+    The last piece is shorter, possibly empty: its NUL indicates that the text is complete.
     """
     data = text_bytes(text)[: TEXT_LENGTH * 255 - 1]
     return [data[at : at + TEXT_LENGTH] for at in range(0, len(data) + 1, TEXT_LENGTH)]

@@ -1,4 +1,4 @@
-"""Messages about the surroundings: tracked targets, obstacle distances, air traffic; and figures to plot."""
+"""Messages about the surroundings: tracked targets, obstacle distances, air traffic; and values to plot."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ _SECOND = 1_000_000
 class AdsbVehicle(NamedTuple):
     """ADSB_VEHICLE (246): an aircraft that a receiver detected ``age`` (µs, whole seconds) ago.
 
-    Degrees; altitude m (``geometric``: by satellite; otherwise by pressure), course rad clockwise from north,
-    speed and climb m/s (up); None where the receiver marks them invalid. ``address``: ICAO's.
+    Latitude and longitude in degrees; altitude m (``geometric``: by satellite; otherwise by pressure), course
+    rad clockwise from north, speed and climb (up) m/s, None if not marked valid. ``address``: ICAO address.
     """
 
     source: Source
@@ -97,7 +97,7 @@ class AdsbVehicle(NamedTuple):
 
 @message("NAMED_VALUE_FLOAT")
 class NamedValue(NamedTuple):
-    """NAMED_VALUE_FLOAT (251): a figure for a ground station to plot; ``name`` of at most 10 characters."""
+    """NAMED_VALUE_FLOAT (251): a value for a ground station to plot; ``name`` of at most 10 characters."""
 
     source: Source
     time_boot: int
@@ -119,8 +119,8 @@ class NamedValue(NamedTuple):
 class CameraTrackingGeo(NamedTuple):
     """CAMERA_TRACKING_GEO_STATUS (276): position of the object that a camera tracks.
 
-    Degrees, m above mean sea level, m/s NED or None. ``status`` is CAMERA_TRACKING_STATUS_FLAGS: 1 while it
-    tracks. The message has no time stamp.
+    Degrees, m above mean sea level, m/s NED (None if unknown). ``status`` is CAMERA_TRACKING_STATUS_FLAGS: 1
+    while tracking. The message has no time stamp.
     """
 
     source: Source
@@ -157,10 +157,10 @@ class CameraTrackingGeo(NamedTuple):
 class ObstacleDistance(NamedTuple):
     """OBSTACLE_DISTANCE (330): distance (m) of the nearest obstacle in each of 72 sectors.
 
-    A distance is None where it is unknown, and more than ``max_distance`` where there is no obstacle.
+    A distance is None if unknown, and more than ``max_distance`` if the sector is free.
 
-    The middle of sector k is at ``offset + k·increment`` (rad, clockwise from above) from north, or from the
-    nose if ``frame`` is MAV_FRAME_BODY_FRD (12). ``time``: µs, on the sender's clock.
+    The middle of sector k is at ``offset + k·increment`` (rad, clockwise seen from above) from north, or from
+    the nose if ``frame`` is MAV_FRAME_BODY_FRD (12). ``time``: µs, on the sender's clock.
     """
 
     source: Source

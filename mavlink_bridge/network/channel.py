@@ -13,8 +13,8 @@ class Faults(NamedTuple):
     """Faults that a channel applies to each datagram on its way to each receiver, independently.
 
     The delay is ``delay`` µs, plus up to ``jitter`` µs, uniform; ``loss``, ``duplication``, ``reordering``
-    are probabilities in 0…1. A reordered datagram waits until one tick after the next one on its path has
-    arrived (and for ever if none follows); jitter that exceeds the spacing of datagrams reorders too.
+    are probabilities in 0…1. A reordered datagram arrives one tick after the next datagram of its path
+    (never, if none follows). Jitter that exceeds the spacing of datagrams reorders them, too.
 
     ``burst``: with 0 the losses are independent of each other. Otherwise losses come in bursts of ``burst``
     datagrams on average, and ``loss`` remains their share: the chain of Gilbert (1960) with two states, one
@@ -49,14 +49,14 @@ class Faults(NamedTuple):
 
 
 Direction = tuple[str | None, str | None]
-"""Sender and receiver, node names; None is any."""
+"""Node names of sender and receiver; None: any node."""
 
 
 class Channel(NamedTuple):
-    """Broadcast domain: what a member sends on its link reaches every other under *their* link's name.
+    """Broadcast domain: a datagram that a member sends on its link reaches every other member on *its* link.
 
-    ``members``: node name → name of its link into this channel. ``overrides``: faults in place of ``faults``
-    for one direction.
+    ``members``: node name → that node's name for its link into this channel. ``overrides``: faults in place
+    of ``faults`` for one direction.
     """
 
     name: str
@@ -67,8 +67,8 @@ class Channel(NamedTuple):
     def between(self, sender: str, receiver: str) -> Faults:
         """Return the faults from ``sender`` to ``receiver``.
 
-        The order of precedence: the override for both, for the sender, for the receiver, for any, and the
-        channel's own faults.
+        The first that exists applies: the override for this pair, for this sender, for this receiver, for any
+        pair, the channel's ``faults``.
         """
         for direction in ((sender, receiver), (sender, None), (None, receiver), (None, None)):
             if direction in self.overrides:

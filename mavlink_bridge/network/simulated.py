@@ -39,44 +39,44 @@ _FOREVER = 1 << 63
 
 
 class _Path:
-    """Path from one sender over one channel to one receiver; nothing passes before ``shut`` (µs)."""
+    """Path from one sender over one channel to one receiver; blocked before ``blocked_until`` (µs)."""
 
     __slots__ = (
+        "blocked_until",
         "channel",
+        "deterministic",
         "faults",
         "held",
+        "latency",
         "link",
         "lost",
-        "plain",
         "queue",
         "random",
         "receiver",
         "sender",
-        "shut",
-        "way",
     )
 
     def __init__(
         self, channel: Channel, sender: str, receiver: str, queue: _Queue, seed: int, tick: int
     ) -> None:
         self.channel, self.sender, self.receiver = channel.name, sender, receiver
-        self.take(channel.between(sender, receiver))
+        self.apply(channel.between(sender, receiver))
         self.link = channel.members[receiver]
         self.queue = queue
-        self.shut = 0
+        self.blocked_until = 0
         self.random = Random(crc32(f"{seed}\0{channel.name}\0{sender}\0{receiver}".encode())).random
         self.held: tuple[str, int, int, Datagram] | None = None
         self.lost: bool | None = None
-        self.way = max(self.faults.delay, tick)
+        self.latency = max(self.faults.delay, tick)
 
-    def take(self, faults: Faults) -> None:
+    def apply(self, faults: Faults) -> None:
         """Apply ``faults`` from now on."""
         self.faults = faults
-        # Without random faults, as for most datagrams of most runs.
-        self.plain = not any((faults.jitter, faults.loss, faults.duplication, faults.reordering))
+        # Without random faults: the usual case, which draws no random number.
+        self.deterministic = not any((faults.jitter, faults.loss, faults.duplication, faults.reordering))
 
     def loses(self) -> bool:
-        """Return whether the next datagram is lost, with one draw, or without a draw if ``loss`` is zero."""
+        """Return whether the next datagram is lost; one random draw, none if ``loss`` is zero."""
         faults = self.faults
         if not faults.loss:
             return False
@@ -88,19 +88,19 @@ class _Path:
 
 
 class _Cut(NamedTuple):
-    """Partition that was made while running and is in force since then."""
+    """Partition between ``members`` and all others, in force until ``until`` (µs)."""
 
     channel: str | None
     members: frozenset[str]
     until: int
 
-    def parts(self, path: _Path) -> bool:
+    def blocks(self, path: _Path) -> bool:
         inside = (path.sender in self.members) != (path.receiver in self.members)
         return inside and self.channel in (None, path.channel)
 
 
 class _Buffer(NamedTuple):
-    """Datagrams that wait for a node that does not read, at most ``room``."""
+    """Input buffer of a node that does not receive: at most ``room`` datagrams."""
 
     room: int
     waiting: list[Datagram]
@@ -109,7 +109,7 @@ class _Buffer(NamedTuple):
 class SimulatedNetwork:
     """All channels of a run.
 
-    ``seed`` is that of the faults. ``tick`` (µs): nothing arrives earlier than one tick after it was sent.
+    ``seed`` is the seed of the faults. ``tick`` (µs): least time from sending to arrival.
     Raises BridgeError for invalid faults and for two channels of one name.
     """
 
@@ -145,7 +145,7 @@ class SimulatedNetwork:
 
     @property
     def under_way(self) -> int:
-        """Number of datagrams that are queued, held back or waiting for a node at present."""
+        """Number of datagrams that are queued, held back for reordering, or buffered for a node."""
         held = sum(path.held is not None for path in self._all_paths())
         waiting = sum(len(buffer.waiting) for buffer in self._buffers.values())
         return held + waiting + sum(map(len, self._queues.values()))
@@ -153,29 +153,29 @@ class SimulatedNetwork:
     def send(self, now: int, sender: str, datagrams: Iterable[Datagram]) -> None:
         """Send the datagrams that ``sender`` emits at ``now`` (µs)."""
         for link, data in datagrams:
-            ways = self._paths.get((sender, link))
-            if ways is None:
+            branches = self._paths.get((sender, link))
+            if branches is None:
                 self._unrouted += 1
                 continue
-            for paths in ways:
+            for paths in branches:
                 number = self._sequences[sender]
                 self._sequences[sender] = number + 1
                 self._sent += len(paths)
-                way, there, arrival = -1, "", None
+                latency, link_name, arrival = -1, "", None
                 for path in paths:
-                    if path.plain and now >= path.shut:
-                        # The arrival is mostly the same for all receivers, so it is made once.
-                        if arrival is None or path.way != way or path.link != there:
-                            way, there = path.way, path.link
-                            arrival = (now + way, sender, number, 1, Datagram(there, data))
+                    if path.deterministic and now >= path.blocked_until:
+                        # Most receivers share latency and link name, so that the entry is made once.
+                        if arrival is None or path.latency != latency or path.link != link_name:
+                            latency, link_name = path.latency, path.link
+                            arrival = (now + latency, sender, number, 1, Datagram(link_name, data))
                         heappush(path.queue, arrival)
                     else:
                         self._carry(now, number, path, data)
 
     def receive(self, now: int, node: str) -> list[Datagram]:
-        """Return what has newly reached ``node`` by ``now`` (µs).
+        """Return the datagrams that have reached ``node`` by ``now`` (µs) since the last call.
 
-        The order is by arrival time, sender, and order of sending.
+        They are sorted by arrival time, sender, and order of sending; buffered ones come first.
         """
         if node in self._buffers:
             self.keep(now, node, self._buffers[node].room)
@@ -189,7 +189,7 @@ class SimulatedNetwork:
         return arrived
 
     def keep(self, now: int, node: str, room: int) -> None:
-        """Buffer what has reached ``node`` at ``now`` (µs) until its next ``receive``, as it does not read.
+        """Buffer the datagrams that have reached ``node`` by ``now`` (µs) until its next ``receive``.
 
         The buffer holds ``room`` datagrams. When it is full, the newest are dropped, as by a socket.
         """
@@ -202,8 +202,8 @@ class SimulatedNetwork:
     def cut(self, channel: str | None, members: Iterable[str], until: int | None = None) -> None:
         """Block all traffic between ``members`` and the others on ``channel`` (None: on any channel).
 
-        The cut lasts from now on until before ``until`` (µs, time of sending; None: until healed). Datagrams
-        under way still arrive. Raises BridgeError for a channel or a member that does not exist.
+        It affects datagrams sent from now on and before ``until`` (µs; None: until healed). Datagrams under
+        way still arrive. Raises BridgeError for a channel or a member that does not exist.
         """
         inside = frozenset(members)
         if channel is not None and channel not in self._names:
@@ -211,10 +211,10 @@ class SimulatedNetwork:
         for name in sorted(inside - self._queues.keys()):
             raise BridgeError(f"no node is named {name!r}; there are {', '.join(sorted(self._queues))}")
         self._cuts.append(_Cut(channel, inside, _FOREVER if until is None else until))
-        self._shut()
+        self._update_blocking()
 
     def heal(self, channel: str | None = None, members: Iterable[str] | None = None) -> None:
-        """End the cuts that were made for ``channel`` and ``members``; None fits every cut."""
+        """End the cuts made with the same ``channel`` and ``members``; None matches every cut."""
         inside = None if members is None else frozenset(members)
         self._cuts = [
             cut
@@ -222,27 +222,27 @@ class SimulatedNetwork:
             if (channel is not None and cut.channel != channel)
             or (inside is not None and cut.members != inside)
         ]
-        self._shut()
+        self._update_blocking()
 
     def lose(self, channels: tuple[str, ...], share: float) -> None:
         """Set the loss to ``share`` (0…1) on all channels whose names begin with one of ``channels``.
 
-        The change holds from now on. Each datagram is lost independently. Raises BridgeError for a share
-        outside 0…1.
+        It applies to datagrams sent from now on. Losses are then independent of each other. Raises
+        BridgeError for a share outside 0…1.
         """
         if not 0.0 <= share <= 1.0:
             raise BridgeError(f"loss = {share} is not in 0…1")
         for path in self._all_paths():
             if path.channel.startswith(channels):
-                path.take(path.faults._replace(loss=share, burst=0.0))
+                path.apply(path.faults._replace(loss=share, burst=0.0))
                 path.lost = None
 
     def _all_paths(self) -> Iterable[_Path]:
-        return (path for ways in self._paths.values() for way in ways for path in way)
+        return (path for branches in self._paths.values() for paths in branches for path in paths)
 
-    def _shut(self) -> None:
+    def _update_blocking(self) -> None:
         for path in self._all_paths():
-            path.shut = max((cut.until for cut in self._cuts if cut.parts(path)), default=0)
+            path.blocked_until = max((cut.until for cut in self._cuts if cut.blocks(path)), default=0)
 
     def _arrivals(self, now: int, node: str) -> list[Datagram]:
         queue = self._queues.get(node)
@@ -254,8 +254,8 @@ class SimulatedNetwork:
     def _carry(self, now: int, number: int, path: _Path, data: bytes) -> None:
         _, jitter, _, duplication, reordering, _ = path.faults
         random = path.random
-        # A fault of zero draws nothing: a clean link costs no random numbers.
-        if now < path.shut or path.loses():
+        # A fault of zero draws no random number.
+        if now < path.blocked_until or path.loses():
             self._dropped += 1
             return
         datagram = Datagram(path.link, data)
@@ -269,8 +269,8 @@ class SimulatedNetwork:
             if not copies:
                 return
         for copy in range(copies):
-            way = path.faults.delay + int(random() * (jitter + 1)) if jitter else path.way
-            arrival = now + max(way, self._tick)
+            latency = path.faults.delay + int(random() * (jitter + 1)) if jitter else path.latency
+            arrival = now + max(latency, self._tick)
             heappush(path.queue, (arrival, path.sender, number, copy + 1, datagram))
         if path.held is not None and path.held[1] != number:
             heappush(path.queue, (arrival + self._tick, *path.held))

@@ -3,9 +3,9 @@
 Each record is a time (µs, 8 bytes big endian, with the link in the low 2 bits) and a frame as it was on the
 wire.
 
-Logs of real flights are damaged. The reader accepts a frame when its checksum is correct. It steps over a
-damaged record when a plausible record follows at the end that the record claims, and otherwise searches for
-the next valid frame. Where nothing is wrong it reads many records at once (``stretch``).
+Logs of real flights may be damaged. The reader accepts a frame if its checksum is correct. It steps over a
+damaged record by the length in its header if a plausible record follows there; otherwise it searches for the
+next valid frame. It reads undamaged records many at a time (``stretch``).
 """
 
 from __future__ import annotations
@@ -38,22 +38,24 @@ from mavlink_bridge.wire.framing import (
 __all__ = ["LINKS", "PLAUSIBLE_JUMP", "Record", "TlogReader", "TlogReport", "TlogWriter", "read_tlog"]
 
 LINKS = 4
+"""Number of links that a stamp can distinguish."""
 PLAUSIBLE_JUMP = 86_400_000_000
-"""µs. A stamp next to damage is accepted only within a day of the previous record."""
+"""µs. Next to damage a stamp is accepted only if it differs from the previous one by at most a day."""
 
 _STAMP = Struct(">Q")
 _CHUNK = 1 << 15
 # A record, the stamp after it and the start byte behind that: the bytes needed to judge a record.
-_AHEAD = 8 + LONGEST_FRAME + 8 + 1
+_LOOK_AHEAD_BYTES = 8 + LONGEST_FRAME + 8 + 1
 
 
 class TlogReport(NamedTuple):
     """Statistics of one pass.
 
     - ``good``: records with a correct checksum
-    - ``bad``: records with a wrong checksum, or stretches that are no record
-    - ``unknown``: well-placed records of messages that the dialect lacks; they are not returned
+    - ``bad``: records with a wrong checksum, or stretches of bytes that are no record
+    - ``unknown``: records of messages that the dialect lacks, at plausible places; they are not returned
     - ``skipped_bytes``: bytes in no good or unknown record
+    - ``time_steps_back``: records with a time before that of the previous record
     - ``truncated``: the log ends within a record, or its compression breaks off
     """
 
@@ -68,9 +70,9 @@ class TlogReport(NamedTuple):
 class TlogWriter:
     """Writer of a tlog, compressed if ``path`` ends in ``.gz``; a context manager.
 
-    The same records give the same bytes. Logs are passed on to others, so no secret may get into them:
-    signatures are removed (with many of them a weak key can be found), and SETUP_SIGNING, which holds a key,
-    is left out and counted in ``withheld``. Raises LogError if the file cannot be created.
+    The same records give the same bytes. Logs are passed on to others and must not contain secrets:
+    signatures are removed, because many of them allow a search for a weak key, and SETUP_SIGNING, which holds
+    a key, is left out and counted in ``withheld``. Raises LogError if the file cannot be created.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -100,7 +102,7 @@ class TlogWriter:
         self._file.close()
 
     def write(self, time_us: int, link: int, data: bytes) -> None:
-        """Write one record for each frame of a datagram, all at one time; the link replaces its low 2 bits.
+        """Write one record for each frame of a datagram; the link replaces the low 2 bits of the time.
 
         Bytes that are no frame are left out and counted in ``skipped_bytes``. Raises LogError for a link
         outside 0…3 and for a time that does not fit.
@@ -113,7 +115,7 @@ class TlogWriter:
         target.write(b"".join([self._record(stamp, frame) for frame in frames]))
         while at < len(data):
             frame = frame_at(data, at)
-            if isinstance(frame, Flaw) or not (frame.known or _goes_on(data, at + len(frame.data))):
+            if isinstance(frame, Flaw) or not (frame.known or _is_frame_boundary(data, at + len(frame.data))):
                 at += 1
                 self.skipped_bytes += 1
                 continue
@@ -128,13 +130,13 @@ class TlogWriter:
         return stamp + (without_signature(frame.data) if frame.signed else frame.data)
 
 
-def _goes_on(data: bytes, at: int) -> bool:
-    """Return whether a datagram ends at ``at`` or a frame begins: the only check for an unknown message."""
+def _is_frame_boundary(data: bytes, at: int) -> bool:
+    """Return whether the datagram ends or a frame begins at ``at``: the only check of an unknown message."""
     return at == len(data) or STARTS.match(data, at) is not None
 
 
 def _is_gzip(head: bytes) -> bool:
-    """Return whether a file begins as gzip and can be unpacked so far; garbage may have the magic bytes."""
+    """Return whether ``head`` is the beginning of gzip data; garbage may have the magic bytes by chance."""
     if not head.startswith(b"\x1f\x8b\x08"):
         return False
     try:
@@ -145,7 +147,10 @@ def _is_gzip(head: bytes) -> bool:
 
 
 class TlogReader:
-    """Records of a log, in the order of the file; each iteration reads it again, in bounded memory."""
+    """Records of a log, in the order of the file.
+
+    Each iteration reads the file again, in bounded memory. Raises LogError if it cannot be read.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -164,13 +169,18 @@ class TlogReader:
     def report(self) -> TlogReport:
         """Statistics of the latest iteration so far.
 
-        They may be some thousand records ahead of those returned.
+        They may include some thousand records that are not returned yet.
         """
         if self._pass is None:
             return TlogReport(0, 0, 0, 0, 0, False)
-        one = self._pass
+        current = self._pass
         return TlogReport(
-            one.good, one.bad, one.unknown, one.skipped_bytes, one.time_steps_back, one.truncated
+            current.good,
+            current.bad,
+            current.unknown,
+            current.skipped_bytes,
+            current.time_steps_back,
+            current.truncated,
         )
 
     @property
@@ -180,9 +190,9 @@ class TlogReader:
 
     @property
     def record_bytes(self) -> int:
-        """Unpacked bytes of good and unknown records and their stamps.
+        """Unpacked bytes of good and unknown records with their stamps, in the latest iteration so far.
 
-        With ``skipped_bytes`` they are all that the latest iteration has passed: at its end the whole log.
+        At its end the sum of ``record_bytes`` and ``skipped_bytes`` is the length of the log.
         """
         return 0 if self._pass is None else self._pass.record_bytes
 
@@ -223,19 +233,19 @@ class _Pass:
                 yield from stretch.records
                 continue
             frame = frame_at(self._window, self._at + 8)
-            if not self._step_over(sound=not isinstance(frame, Flaw)):
+            if not self._step_over(unknown_message=not isinstance(frame, Flaw)):
                 record = self._search(cut=frame is Flaw.PARTIAL)
                 if record is not None:
                     yield record
 
     def _fill(self) -> bool:
-        """Load into the window all that is needed to judge the current record; return False at the end.
+        """Load into the window the bytes needed to judge the current record; return False at the end.
 
-        The 8 bytes before it stay: a search may find that they were a stamp.
+        The 8 bytes before it are kept: they may be a stamp, if a search finds a frame here.
         """
-        while len(self._window) - self._at < _AHEAD and not self._ended:
+        while len(self._window) - self._at < _LOOK_AHEAD_BYTES and not self._ended:
             try:
-                # Not read(): before a compressed stream breaks off, read1() returns all that came before.
+                # Not read(): if a compressed stream breaks off, only read1() returns the bytes before that.
                 chunk = self._stream.read1(_CHUNK)
             except (EOFError, zlib.error, gzip.BadGzipFile):
                 chunk = b""
@@ -248,7 +258,7 @@ class _Pass:
         return self._at < len(self._window)
 
     def _advance(self, stretch: Stretch) -> None:
-        """Continue behind ``stretch``."""
+        """Count the records of ``stretch`` and continue behind it."""
         last = stretch.records[-1]
         self.good += len(stretch.records)
         self.time_steps_back += stretch.time_steps_back
@@ -267,11 +277,11 @@ class _Pass:
         (stamp,) = _STAMP.unpack_from(self._window, at)
         return reference is None or bool(abs(stamp - reference) <= PLAUSIBLE_JUMP)
 
-    def _step_over(self, *, sound: bool) -> bool:
-        """Step over an untrusted record by the length that it claims; return whether that was possible.
+    def _step_over(self, *, unknown_message: bool) -> bool:
+        """Step over an unverified record by the length in its header; return whether that was possible.
 
-        Its stamp must be plausible, and a plausible record must follow it. ``sound``: only the message is
-        unknown.
+        Its stamp must be plausible, and a plausible record or the end of the log must follow it.
+        ``unknown_message``: the dialect lacks the message id, and the header has no fault.
         """
         length = claimed_length(self._window, self._at + 8)
         if length is None:
@@ -284,7 +294,7 @@ class _Pass:
             STARTS.match(self._window, end + 8) is not None and self._plausible(end, own)
         ):
             return False
-        if sound:
+        if unknown_message:
             self.unknown += 1
             self.record_bytes += 8 + length
         else:
@@ -294,10 +304,10 @@ class _Pass:
         return True
 
     def _search(self, *, cut: bool) -> Record | None:
-        """Continue at the next frame with a correct checksum; return its record, or None if there is none.
+        """Continue behind the next frame with a correct checksum; return its record, or None.
 
-        A frame without skipped bytes before it gets the last stamp. ``cut``: the current record may be a good
-        one that the end of the file cuts off.
+        The 8 bytes before the frame are its stamp if they were skipped and are plausible; otherwise it gets
+        the last stamp. ``cut``: the end of the file may cut off the current record.
         """
         skipped = 0
         while self._fill():

@@ -1,7 +1,7 @@
-"""Undamaged stretch of a log: complete records right behind one another, each with a correct checksum.
+"""Undamaged stretch of a log: complete records without gaps, each with a correct checksum.
 
-Nearly all of a log is such a stretch, so most of the reading time is spent here. The reader examines only
-length, flags and message id of a header; anything irregular is left to the slower search in ``log``.
+Nearly all of a log is such a stretch, so most of the reading time is spent here. Of the header only start
+byte, length, flags and message id are examined; anything irregular is left to the slower search in ``log``.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ class Stretch(NamedTuple):
 
 
 def leading_records(data: bytes, start: int, before: int) -> Stretch:
-    """Return the records of ``data`` from ``start`` on, up to the first that cannot be read here.
+    """Return the records of ``data`` from ``start`` on, up to the first irregular one.
 
-    That is the first that is damaged, cut off, or of a message that the dialect lacks. ``before``: time (µs)
-    of the previous record, 0 if there is none.
+    A record is irregular if it is damaged, cut off, or of a message that the dialect lacks. ``before``: time
+    (µs) of the previous record, 0 if there is none.
     """
     records: list[Record] = []
     back, at, last = 0, start, len(data) - SHORTEST_RECORD
-    # Each name that is local here saves a look-up for each record.
+    # Local names save global look-ups for each record.
     add, make, head, checksum = records.append, tuple.__new__, _HEAD.unpack_from, mcrf4xx
     extra_v1, extra_v2 = _EXTRA_V1, _EXTRA_V2.get
     while at <= last:

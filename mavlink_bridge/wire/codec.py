@@ -22,19 +22,19 @@ Accept = Callable[[int, int, int], bool]
 
 @lru_cache(maxsize=1024)
 def _read(frame: Frame) -> Message | None:
-    """Parse a frame with ``Converter.parse``, once in a process for all receivers of the frame."""
+    """Parse a frame with ``Converter.parse``, only once for all receivers of the frame in this process."""
     return BY_ID[frame.message_id].parse(Source(frame.system, frame.component), frame.payload)
 
 
 class Counters(NamedTuple):
     """Statistics of the bytes fed so far.
 
-    - ``good``: frames that became messages
+    - ``good``: frames that were decoded to messages
     - ``bad``: false starts, wrong checksums, invalid values
     - ``unknown``: frames with message ids that the dialect lacks
-    - ``filtered``: valid frames that ``accept`` rejected, or of a message not in the table
+    - ``filtered``: valid frames that ``accept`` rejected, or of a message that ``messages`` lacks
     - ``skipped_bytes``: bytes that belong to no frame
-    - ``refused``: accepted frames that lack the required signature
+    - ``refused``: frames that ``accept`` passed and ``signing`` refused
     """
 
     good: int
@@ -85,11 +85,12 @@ class Codec:
     def feed(self, data: bytes, *, whole: bool = False) -> list[Message]:
         """Return the messages that ``data`` completes, in order; never raise.
 
-        A partial frame waits for its rest, unless ``whole`` says that no rest will come, as in datagrams of
-        several senders: there the partial frame would delay the data of the next sender.
+        A partial frame waits for its rest. With ``whole`` it is dropped instead: in datagrams of several
+        senders no rest follows, and the partial frame would delay the data of the next sender.
 
-        A NaN or infinity drops a state message (counted as bad). It is kept in messages that command or echo,
-        where it may mean *ignored*: CommandInt, CommandLong, SetpointLocal, PositionTarget.
+        A NaN or infinity drops a message declared as ``finite`` (counted as bad). Other messages keep it, as
+        it may mean *ignored* or *unknown*: commands, set-points and their echo, mission items, altitude,
+        home, estimator reports.
         """
         accept, signing = self._accept, self._signing
         found: list[Message] = []
@@ -115,7 +116,7 @@ class Codec:
         """Encode ``message`` as MAVLink 2 frames from ``message.source``.
 
         Returns one frame, or several for a StatusText above 50 characters. Raises EncodeError, with field and
-        value, for a value that does not fit or that is not finite in a state message.
+        value, for a value that does not fit, or that is not finite in a message declared as ``finite``.
         """
         row = BY_TYPE[type(message)]
         if isinstance(message, StatusText) and len(message.text) > TEXT_LENGTH:
@@ -135,7 +136,7 @@ class Codec:
         return frame_v1(row.id, row.crc_extra, message.source, self._next(message.source), payload)
 
     def _encode_long(self, row: Converter, message: StatusText) -> bytes:
-        # STATUSTEXT.id marks chunks of one text; zero means that there is only one chunk.
+        # STATUSTEXT.id identifies the chunks of one text; zero means a text of one chunk.
         text_id = self._sequences.get(message.source, 0) + 1
         pieces = [
             row.struct.pack(message.severity, piece, text_id, number)

@@ -1,8 +1,8 @@
-"""Framing of MAVLink in a stream of bytes: where frames begin and end, and whether their checksum is right.
+"""Framing of MAVLink in a byte stream: where frames begin and end, and whether their checksum is correct.
 
 Source: the MAVLink serialisation guide. Version 1 is ``FE len seq sys comp id payload crc``; version 2 is
 ``FD len incompat compat seq sys comp id(3) payload crc [signature(13)]``, with trailing zeros of the payload
-left out. The checksum is CRC-16/MCRF4XX over all that follows the start byte, and the message's CRC_EXTRA.
+left out. The checksum is CRC-16/MCRF4XX over header without start byte, payload, and the message's CRC_EXTRA.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as mavlink
 
 _MARKERS = (mavlink.PROTOCOL_MARKER_V1, mavlink.PROTOCOL_MARKER_V2)
-_DATAGRAM = 512
+_MAX_CACHED_BYTES = 512
 LONGEST_FRAME = 280  # version 2: 10 header, 255 payload, 2 checksum, 13 signature
 
 STARTS = re.compile(b"[\xfd\xfe]")
@@ -29,18 +29,18 @@ CRC_EXTRA: dict[int, bytes] = {
 }
 """CRC_EXTRA by message id.
 
-The dialect ``all`` is that of ardupilotmega and more: logs of PX4 hold messages of ``development``, which
-could not be verified otherwise. No id has two meanings in it.
+The dialect ``all`` contains ardupilotmega, and ``development``, whose messages PX4 logs and which could not
+be verified otherwise. No id has two meanings in it.
 """
 
 
 class Frame(NamedTuple):
     """One frame as it was on the wire.
 
-    ``data`` is the whole frame, ``payload`` its payload as sent, without trailing zeros.
+    ``data`` is the whole frame, ``payload`` its payload as sent (MAVLink 2 senders cut trailing zeros).
 
-    ``known`` is False when the dialect lacks the message id: its checksum cannot be verified. ``signed`` says
-    that 13 bytes of signature end the frame, not that they are genuine.
+    ``known`` is False if the dialect lacks the message id; the checksum is then unverified. ``signed``: the
+    frame ends with 13 bytes of signature, which are not verified here.
     """
 
     version: int
@@ -55,7 +55,7 @@ class Frame(NamedTuple):
 
 
 class Flaw(Enum):
-    """Reason why there is no frame: the bytes end too early, or no frame starts here."""
+    """Reason why there is no frame: the bytes end too early, or no valid frame starts here."""
 
     PARTIAL = "partial"
     FALSE_START = "false start"
@@ -64,8 +64,8 @@ class Flaw(Enum):
 def frame_at(data: bytes, start: int) -> Frame | Flaw:
     """Return the frame that starts at ``data[start]``, or the reason why there is none.
 
-    An incompatibility flag other than *signed* makes it a false start, as MAVLink demands: the length of such
-    a frame is unknown.
+    A wrong checksum is a false start, and so is an incompatibility flag other than *signed*, as MAVLink
+    demands: the length of such a frame is unknown.
     """
     size = len(data)
     if start >= size:
@@ -132,12 +132,12 @@ def leading_frames(data: bytes) -> tuple[tuple[Frame, ...], int]:
     and its frames depend only on its bytes.
     """
     # A bytearray may change, and may not be hashed.
-    short = type(data) is bytes and len(data) <= _DATAGRAM
+    short = type(data) is bytes and len(data) <= _MAX_CACHED_BYTES
     return _leading(data) if short else _leading.__wrapped__(data)
 
 
 def claimed_length(data: bytes, start: int) -> int | None:
-    """Return the length that the frame at ``data[start]`` claims, verified or not; None if it claims none."""
+    """Return the frame length by the unverified header at ``data[start]``, or None if that is no header."""
     mark = data[start : start + 1]
     if mark == b"\xfd" and start + 3 <= len(data) and data[start + 2] <= mavlink.MAVLINK_IFLAG_SIGNED:
         signature: int = mavlink.MAVLINK_SIGNATURE_BLOCK_LEN * data[start + 2]
@@ -197,13 +197,13 @@ def without_signature(data: bytes) -> bytes:
 
 
 class Framer:
-    """Splitter of a byte stream into frames, however the stream is chopped up.
+    """Splitter of a byte stream, in pieces of any length, into frames.
 
-    It keeps fewer than 281 bytes between two calls. After a false start the search continues one byte later.
-    A frame of an unknown message cannot be verified. It is therefore skipped by its length only if another
-    frame starts right behind it (the framer waits for that one byte); otherwise it was a false start. Where
-    ``whole`` says that no frame continues in the next call, nothing waits. ``frames`` + ``unknown`` count
-    frames, ``bad`` false starts, ``skipped_bytes`` the bytes that belong to no frame.
+    It keeps at most 280 bytes between two calls. After a false start the search continues one byte later. A
+    frame of an unknown message cannot be verified. It is therefore accepted only if a start byte follows it
+    (the framer waits for this byte); otherwise it counts as a false start. ``whole``: no frame continues in
+    the next call, so nothing waits. ``frames`` counts known frames, ``unknown`` accepted unknown ones,
+    ``bad`` false starts, and ``skipped_bytes`` the bytes that belong to no frame.
     """
 
     def __init__(self, *, unknown: bool = False) -> None:
@@ -221,7 +221,7 @@ class Framer:
         return len(self._rest)
 
     def feed(self, data: bytes, *, whole: bool = False) -> Sequence[Frame]:
-        """Return the frames with a correct checksum that ``data`` completes."""
+        """Return the frames that ``data`` completes, with a correct checksum (unknown ones: unverified)."""
         if self._rest:
             data = self._rest + data
         frames, at = leading_frames(data)
@@ -232,7 +232,7 @@ class Framer:
         return self._search(data, at, list(frames), whole=whole)
 
     def _search(self, data: bytes, at: int, found: list[Frame], *, whole: bool) -> list[Frame]:
-        """Return ``found`` and the frames of ``data`` from ``at`` on, where something is wrong."""
+        """Return ``found`` and the frames of ``data`` from ``at`` on, where an irregularity begins."""
         size = len(data)
         while at < size:
             frame = frame_at(data, at)

@@ -7,13 +7,13 @@ from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
-_MAGIC: Final = {mavlink.PROTOCOL_MARKER_V2: 5, mavlink.PROTOCOL_MARKER_V1: 3}
-"""Offset of the system id in MAVLink 2 and 1."""
+_SYSTEM_OFFSETS: Final = {mavlink.PROTOCOL_MARKER_V2: 5, mavlink.PROTOCOL_MARKER_V1: 3}
+"""Offset of the system id in a frame, by the frame's start byte."""
 
 
 def sending_system(data: bytes) -> int:
-    """Return the system id in the header of the first frame; 0, which is no system's id, if there is none."""
-    place = _MAGIC.get(data[0]) if data else None
+    """Return the system id of the frame at the beginning of ``data``; 0, an invalid id, if there is none."""
+    place = _SYSTEM_OFFSETS.get(data[0]) if data else None
     return data[place] if place is not None and place < len(data) else 0
 
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Final
 
 LONGEST: Final = 1400
-"""Bytes of a datagram: what Ethernet carries in one packet, tunnels included.
+"""Largest number of bytes of a datagram: what one Ethernet packet carries, also through tunnels.
 
-Some clients read no more than 2048, and UDP sends nothing above 65507.
+Some clients read no more than 2048 bytes, and UDP carries at most 65507.
 """
 
 

@@ -1,6 +1,6 @@
 """Number in the four bytes of PARAM_VALUE (22), in the encoding of each firmware.
 
-ArduPilot casts every number to float32. PX4 puts the bytes of an integer there
+ArduPilot casts every number to float32. PX4 sends the bytes of an integer unchanged
 (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE).
 """
 
@@ -26,7 +26,7 @@ _INTEGERS: Final = {
 
 
 def number_of(message: ParamValue, *, bytewise: bool) -> float | None:
-    """Return the value of ``message``, or None if it is not finite; ``bytewise``: encoded as by PX4."""
+    """Return the value of ``message``, or None if it is not finite; ``bytewise``: in PX4's encoding."""
     layout = _INTEGERS.get(message.type, "<f") if bytewise else "<f"
     (number,) = unpack(layout, message.raw)
     return float(number) if isfinite(number) else None

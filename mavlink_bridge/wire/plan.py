@@ -5,8 +5,8 @@ Sender and receiver hold the same numbers, bit for bit. A plan is piecewise cons
 velocities in units of A dt and positions in units of ½ A dt², the exact motion over a knot, p' = p + v dt + ½
 a dt², v' = v + a dt, is p' = p + 2v + a, v' = v + a in integers: nothing is ever rounded again.
 
-Little endian: kind 1, origin 1, dt/4 µs 2, epoch 7, position 3×4, velocity 3×3, then 3×2 for each knot: 32 +
-6 N bytes, N ≤ 16.
+Sizes in bytes, little endian: kind 1, origin 1, dt/4 µs 2, epoch 7, position 3×4, velocity 3×3, then 3×2 for
+each knot: 32 + 6 N bytes, N ≤ 16.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from mavlink_bridge.errors import PlanWireError
 PAYLOAD_TYPE = 0xDC01
 """TUNNEL.payload_type; values above 32767 are free for private use."""
 KNOTS = 16
+"""Largest number of knots N."""
 KIND = 1
 STEP = 4
 """Unit of dt (µs); dt is a whole multiple of it."""
@@ -63,8 +64,8 @@ class WirePlan(NamedTuple):
     def shifted(self, knots: int) -> WirePlan:
         """Return the rest of the same motion from knot ``knots`` (0…N) on.
 
-        The epoch moves, the state advances exactly, and the accelerations that are over are dropped. Nothing
-        is appended: the plan gets shorter. Raises PlanWireError beyond the end.
+        The epoch moves, the state advances exactly, and past accelerations are dropped. Nothing is appended:
+        the plan gets shorter. Raises PlanWireError for ``knots`` outside 0…N.
         """
         if not 0 <= knots <= len(self.accelerations):
             raise PlanWireError(f"shift by {knots} knots of a plan that has {len(self.accelerations)}")
@@ -129,10 +130,11 @@ def quantise(
     accelerations: npt.ArrayLike,
     origin: int,
 ) -> WirePlan:
-    """Return the nearest plan on the wire to position (3,) m, velocity (3,) m/s, accelerations (n, 3) m/s².
+    """Return the plan in wire units nearest to position (3,) m, velocity (3,) m/s, accelerations (n, 3) m/s².
 
-    Each number is off by half a unit at most, hence a position at knot n by at most (½ + n + ½n²) · ½ A dt²
-    (0.73 mm after 16 knots of 0.1 s). Raises PlanWireError when a number is not finite or out of range.
+    Each number is rounded by half a unit at most, hence a position at knot n by at most (½ + n + ½n²) ·
+    ½ A dt² (0.72 mm after 16 knots of 0.1 s). Raises PlanWireError for a wrong shape or
+    dt, and for a number that is not finite or out of range.
     """
     _check_step(dt)
     p, v, a = (np.asarray(part, dtype=np.float64) for part in (position, velocity, accelerations))

@@ -1,7 +1,7 @@
 """Coordination set of a vehicle in 41 bytes of TUNNEL, sent beside its committed plan.
 
-Little endian: kind 1, flags 1 (1: farewell), epoch 7 (µs), system ids 1…255 as bits 32, bit k of the whole
-for id k.
+Sizes in bytes, little endian: kind 1, flags 1 (bit 0: farewell), epoch 7 (µs), members 32 (bit k: system id
+k, 1…255).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ _SIZE = 41
 class Roster(NamedTuple):
     """Coordination set that goes with a committed plan.
 
-    ``members``: system ids 1…255; ``epoch`` (µs): that of the plan; ``farewell``: the sender's last plan
-    remains valid, and the sender makes no other before it has joined again.
+    ``members``: system ids 1…255; ``epoch`` (µs): epoch of the plan; ``farewell``: the sender's last plan
+    remains valid, and the sender makes no further plan before it has joined again.
     """
 
     epoch: int

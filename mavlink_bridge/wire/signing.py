@@ -23,11 +23,11 @@ UNIT: Final = 10
 LATEST: Final = (1 << 48) - 1
 """Last possible stamp, in the year 2104."""
 MINUTE: Final = 6_000_000
-"""Steps by which the first stamp of a new stream may be behind the newest stamp."""
+"""Steps of a stamp in a minute: the first stamp of a new stream may be this far behind the newest stamp."""
 STREAMS: Final = 256
-"""Largest number of streams that are remembered; only a holder of the key can create one."""
+"""Largest number of remembered streams; only a holder of the key can create a stream."""
 RADIOS: Final = frozenset((mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO))
-"""Messages that come from telemetry radios; these have no key."""
+"""Messages of telemetry radios, which have no key."""
 
 
 class Refusal(Enum):
@@ -45,7 +45,8 @@ class Signing:
     so that a frame received on one cannot be replayed on another; nodes do not share it.
 
     Without a key nothing is signed and every frame is accepted. ``newest``: the newest stamp (10 µs since
-    2015) that was sent or received; after a restart, pass the stored value to ``resume``.
+    2015) that was sent, received or set as the current time; store it, and pass it to ``resume`` after a
+    restart.
     """
 
     def __init__(self, key: Key | None = None, unsigned: Collection[int] = RADIOS) -> None:
@@ -65,9 +66,9 @@ class Signing:
     def present(self, unix: int) -> None:
         """Set the current time to ``unix`` (µs).
 
-        A node without the time of day may count from any instant before 2015. From the first call on, a new
-        stream is refused if it is older than that call: its frames may have been recorded for replay after a
-        restart.
+        A node without the time of day may count from any instant before 2015. After the first call, frames of
+        a new stream are refused if their stamp is not later than the time of that call: they may have been
+        recorded before a restart.
         """
         stamp = (unix - EPOCH) // UNIT
         if stamp > self.newest:
@@ -77,12 +78,12 @@ class Signing:
             self._floor = max(self._floor, min(stamp, LATEST))
 
     def resume(self, newest: int) -> None:
-        """Continue after a restart: no stamp up to ``newest`` is accepted or sent."""
+        """Continue after a restart: no stamp up to ``newest`` (10 µs since 2015) is accepted or sent."""
         self.newest = max(self.newest, min(newest, LATEST))
         self._floor = max(self._floor, self.newest)
 
     def use(self, key: Key | None, since: int = 0) -> None:
-        """Replace the key (None: no key) from now on; the current stamp is at least ``since``."""
+        """Replace the key (None: no key) from now on, and raise ``newest`` to ``since`` if it is earlier."""
         if key != self.key:
             self.key, self._floor = key, 0
             self._streams.clear()
@@ -100,7 +101,7 @@ class Signing:
         return data + self.key.signature(data)
 
     def check(self, frame: Frame) -> Refusal | None:
-        """Return why ``frame`` is refused, or None if it is accepted; a second copy is refused."""
+        """Return why ``frame`` is refused, or None if it is accepted; a second copy is refused as old."""
         if self.key is None:
             return None
         refusal = self._judged(frame, self.key)
@@ -122,8 +123,8 @@ class Signing:
             return Refusal.OLD
         if not hmac.compare_digest(key.signature(data[:-6]), data[-6:]):
             return Refusal.FORGED
-        # Stored only after the signature is verified. Otherwise a forged stamp of tomorrow would lock out the
-        # true sender until then.
+        # Stored only after the signature is verified. Otherwise a forged stamp in the future would block the
+        # true sender until that time.
         self._remember(stream, stamp)
         self.newest = max(self.newest, stamp)
         return None
@@ -131,7 +132,7 @@ class Signing:
     def _remember(self, stream: tuple[int, int, int], stamp: int) -> None:
         streams = self._streams
         if stream not in streams and len(streams) >= STREAMS:
-            # Drop the stream with the oldest stamp; if it resumes, its stamps must be later than that one.
+            # Drop the stream with the oldest stamp. New streams, and this one if it resumes, must be later.
             silent = min(streams, key=streams.__getitem__)
             self._floor = max(self._floor, streams.pop(silent))
         streams[stream] = stamp

@@ -21,8 +21,9 @@ HOVERING: Final = 0.5
 STEEPEST: Final = math.radians(45.0)
 """Largest tilt that is followed (rad)."""
 
-_UNIT: Final = (0.9, 1.1)
-_QUICKEST: Final = 100.0
+# Accepted norms of the quaternion, and the accepted yaw rate (rad/s).
+_NORM_RANGE: Final = (0.9, 1.1)
+_MAX_YAW_RATE: Final = 100.0
 
 
 def climbing(message: SetpointAttitude, climb: float, sink: float) -> Reading:
@@ -68,9 +69,9 @@ def _fault(message: SetpointAttitude) -> Refusal | None:
         return Refusal("Attitude refused: body rates alone are not flown")
     if mask & mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE or not 0.0 <= message.thrust <= 1.0:
         return Refusal("Attitude refused: no thrust from 0 to 1")
-    if not _UNIT[0] <= math.hypot(*message.attitude) <= _UNIT[1]:
+    if not _NORM_RANGE[0] <= math.hypot(*message.attitude) <= _NORM_RANGE[1]:
         return Refusal("Attitude refused: not a unit quaternion")
-    if yaw_rate is not None and not abs(yaw_rate) <= _QUICKEST:
+    if yaw_rate is not None and not abs(yaw_rate) <= _MAX_YAW_RATE:
         return Refusal("Attitude refused: yaw rate out of range")
     return None
 

@@ -33,7 +33,7 @@ class AutonomousModes:
         self.following.configure(config.follow)
 
     def begin(self, mode: Mode, here: Estimate) -> None:
-        """Start ``mode`` from ``here``."""
+        """Start ``mode`` from ``here``; a mission resumes its current item, or restarts if completed."""
         if mode is Mode.RETURN:
             self._returning.begin(here)
         elif mode is Mode.FOLLOW:

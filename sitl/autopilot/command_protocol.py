@@ -13,7 +13,8 @@ from sitl.autopilot.commander import Commander
 from sitl.autopilot.firmware import CommandRefusal, Firmware, Mode
 from sitl.values.home import ABOVE_HOME, ABOVE_SEA, NOWHERE
 
-_FORCED: Final = 21196.0
+# Parameter 2 of COMPONENT_ARM_DISARM (400) that forces it.
+_FORCE_CODE: Final = 21196.0
 
 
 class Order(NamedTuple):
@@ -52,7 +53,7 @@ Handler = Callable[[Order], CommandRefusal | None]
 
 
 class Orders:
-    """Executor of commands. A retried command finds its effect already in place and changes nothing."""
+    """Executor of commands. A repeated request to arm, to disarm or for a mode has no further effect."""
 
     def __init__(self, commander: Commander, flavour: Firmware, more: Mapping[int, Handler]) -> None:
         """``more`` maps further MAV_CMDs, which do not concern flight, to their handlers."""
@@ -83,9 +84,9 @@ class Orders:
     def _arm(self, order: Order) -> CommandRefusal | None:
         wanted, code = order.params[:2]
         if wanted == 1.0:
-            return self._commander.arm(order.now, forced=code == _FORCED)
+            return self._commander.arm(order.now, forced=code == _FORCE_CODE)
         if wanted == 0.0:
-            return self._commander.disarm(forced=code == _FORCED)
+            return self._commander.disarm(forced=code == _FORCE_CODE)
         return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Arming: parameter 1 must be 0 or 1")
 
     def _take_off(self, order: Order) -> CommandRefusal | None:

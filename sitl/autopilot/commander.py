@@ -21,9 +21,9 @@ from sitl.telemetry.status_text import StatusReporter
 from sitl.values.home import Home
 
 # Sink speed of PX4's position mode without sticks (m/s).
-_SINKING: Final = 0.6
+_DESCENT_SPEED: Final = 0.6
 # Modes that failsafes enter, by severity; failsafes enter no other modes.
-_GRAVITY: Final = {Mode.HOLD: 1, Mode.RETURN: 2, Mode.LAND: 3}
+_SEVERITY: Final = {Mode.HOLD: 1, Mode.RETURN: 2, Mode.LAND: 3}
 
 
 class Commander:
@@ -55,11 +55,11 @@ class Commander:
         self._status_text = status_text
         self._takeoff_height = config.takeoff_height
         self._ready_at = 0 if config.start_height else round(config.ready_after * 1e6)
-        self._touched_at: int | None = None
-        self._blind_since: int | None = None
+        self._contact_since: int | None = None
+        self._unlocated_since: int | None = None
         self._disarm_at = 0
-        self._chosen = flavour.boot_mode
-        self._lost = False
+        self._chosen_mode = flavour.boot_mode
+        self._setpoints_lost = False
         self.doubts: Callable[[], list[str]] = list
         self.armed = False
         self.landed = True
@@ -107,7 +107,7 @@ class Commander:
             if doubts := [reason] if reason else self.doubts():
                 return CommandRefusal(mavlink.MAV_RESULT_FAILED, f"Arming refused: {doubts[0]}")
         self.armed = True
-        self._postpone(now)
+        self._restart_disarm_timer(now)
         self._status_text.inform("Armed")
         if self.mode is Mode.MISSION:
             self._autonomous_modes.begin(self.mode, self._estimate())
@@ -131,10 +131,10 @@ class Commander:
     def fail_safe(self, mode: Mode, now: int) -> None:
         """Change to ``mode`` as a failsafe.
 
-        Ignored while disarmed, on the ground, or in a mode at least as severe. Without a position it lands
-        instead.
+        Ignored while disarmed, on the ground, or in a mode at least as severe. Without a position the mode is
+        LAND instead.
         """
-        if not self.armed or self.landed or _GRAVITY.get(mode, 0) <= _GRAVITY.get(self.mode, 0):
+        if not self.armed or self.landed or _SEVERITY.get(mode, 0) <= _SEVERITY.get(self.mode, 0):
             return
         self._switch(mode if self.ready else Mode.LAND, now)
 
@@ -149,15 +149,15 @@ class Commander:
         if isinstance(verdict, CommandRefusal):
             return verdict
         self.mode, self._takeoff_height = verdict.mode, verdict.height
-        self._lost = False
+        self._setpoints_lost = False
         if self.armed:
-            self._postpone(now)
+            self._restart_disarm_timer(now)
             self._guidance.takeoff(verdict.height + self._home.height, self._estimate().pose)
         return None
 
     def enter(self, mode: Mode, now: int) -> CommandRefusal | None:
         """Change to ``mode``."""
-        self._lost = False
+        self._setpoints_lost = False
         if mode is self.mode:
             return None
         status = self.status(now)
@@ -168,7 +168,7 @@ class Commander:
             return refusal
         self._switch(mode, now)
         if not self.armed or self._flavour.armable_mode(mode):
-            self._chosen = mode
+            self._chosen_mode = mode
         return None
 
     def mode_doubt(self, now: int) -> str | None:
@@ -187,7 +187,7 @@ class Commander:
 
     def steered(self, now: int) -> None:
         """Handle a usable set-point: PX4 resumes OFFBOARD if only a lack of set-points had ended it."""
-        if self._lost and self.armed:
+        if self._setpoints_lost and self.armed:
             self._switch(Mode.GUIDED, now)
 
     # Events
@@ -200,23 +200,23 @@ class Commander:
         self.ready = located and now >= self._ready_at
         if not on_ground:
             self.landed = False
-            self._touched_at = None
+            self._contact_since = None
         elif not self.landed:
-            self._touch(now)
+            self._confirm_landing(now)
         if not self.armed:
             return
         guidance = self._guidance
-        if not located or self._blind_since is not None:
-            self._look(now, located)
+        if not located or self._unlocated_since is not None:
+            self._watch_position(now, located)
         if guidance.timed_out:
-            self._lose(now)
+            self._handle_timeout(now)
         elif self.mode in MODES:
             self._autonomous_step(now)
         elif guidance.activity is Activity.TAKEOFF and guidance.reached:
-            self.mode = self._chosen = self._flavour.after_takeoff
+            self.mode = self._chosen_mode = self._flavour.after_takeoff
             guidance.end_takeoff()
         if not self.landed:
-            self._postpone(now)
+            self._restart_disarm_timer(now)
         elif now >= self._disarm_at:
             self._stop("Disarmed: on the ground for too long")
 
@@ -233,12 +233,12 @@ class Commander:
             self._switch(Mode.RETURN, now)
         elif event is Event.FINISHED:
             self._status_text.inform("Mission finished")
-            self.mode = self._chosen = self._flavour.after_mission
+            self.mode = self._chosen_mode = self._flavour.after_mission
             self._guidance.hold()
 
     def _switch(self, mode: Mode, now: int) -> None:
         self.mode = mode
-        self._lost = False
+        self._setpoints_lost = False
         if self.armed and mode is Mode.MISSION:
             self._autonomous_modes.begin(mode, self._estimate())
             return
@@ -259,40 +259,43 @@ class Commander:
             case _:
                 self._guidance.hold()
 
-    def _lose(self, now: int) -> None:
+    def _handle_timeout(self, now: int) -> None:
         self._guidance.timed_out = False
         self._status_text.warn("Set-points timed out")
         if self._flavour.after_loss is not self.mode:
             self._switch(self._flavour.after_loss, now)
-            self._lost = self._flavour.keeps_choice
+            self._setpoints_lost = self._flavour.keeps_choice
         if self.mode is Mode.POSITION:
-            self._guidance.land(_SINKING)
+            self._guidance.land(_DESCENT_SPEED)
 
-    def _look(self, now: int, located: bool) -> None:
-        """Land if the position stays lost in flight, whichever controller is active."""
+    def _watch_position(self, now: int, located: bool) -> None:
+        """Land, from any mode, if the position stays lost in flight."""
         if located or self.landed:
-            self._blind_since = None
+            self._unlocated_since = None
             return
-        if self._blind_since is None:
-            self._blind_since = now
-        if self.mode is not Mode.LAND and now - self._blind_since >= self._flavour.blind_patience:
+        if self._unlocated_since is None:
+            self._unlocated_since = now
+        if (
+            self.mode is not Mode.LAND
+            and now - self._unlocated_since >= self._flavour.position_loss_timeout_us
+        ):
             self._status_text.warn(self._flavour.blind_text)
             self._switch(Mode.LAND, now)
 
-    def _touch(self, now: int) -> None:
-        """Handle ground contact until it counts as landed."""
+    def _confirm_landing(self, now: int) -> None:
+        """Handle ground contact; after ``touchdown_time`` the vehicle counts as landed."""
         activity = self._guidance.activity
         if activity is Activity.TAKEOFF:
             return
         if activity is Activity.LAND:
             # Thrust is cut at once, so that the vehicle does not bounce until the landing is confirmed.
             self._guidance.idle()
-        if self._touched_at is None:
-            self._touched_at = now
-        if now - self._touched_at < self._config.touchdown_time * 1e6:
+        if self._contact_since is None:
+            self._contact_since = now
+        if now - self._contact_since < self._config.touchdown_time * 1e6:
             return
         self.landed = True
-        self._postpone(now)
+        self._restart_disarm_timer(now)
         if self.armed and self._guidance.activity is Activity.IDLE:
             self._stop("Landed, disarmed")
         self._guidance.idle()
@@ -302,7 +305,7 @@ class Commander:
         self._guidance.idle()
         self._autonomous_modes.end()
         if self._flavour.keeps_choice:
-            self.mode = self._chosen
+            self.mode = self._chosen_mode
         elif self.mode is Mode.LAND:
             self.mode = self._flavour.after_landing
         elif self.mode is Mode.RETURN:
@@ -313,5 +316,5 @@ class Commander:
             self.mode = self._flavour.after_takeoff
         self._status_text.inform(why)
 
-    def _postpone(self, now: int) -> None:
+    def _restart_disarm_timer(self, now: int) -> None:
         self._disarm_at = now + round(self._config.disarm_delay * 1e6)

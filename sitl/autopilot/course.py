@@ -1,12 +1,12 @@
 """References of the controller: the guidance's motion with its jerk, in terms of the estimate.
 
-An autopilot closes its position loop on its estimate. The physics closes it on the truth, to the bit; so the
-estimate's error is subtracted from the reference instead. For an estimate x̂ = x + e the loop that drives x̂
-− x_d to zero is the one that drives x − (x_d − e) to zero: with position, velocity and yaw so shifted the
-vehicle flies exactly as if the controller had received the estimate. A wrong attitude tilts the thrust that
-was meant to be vertical, which is an acceleration: to first order −θ × (a − g), θ being the attitude error as
-a rotation vector and a − g the requested specific force. Body rates are not shifted: the noise of the rate
-loop's gyros lies far above the motors' bandwidth, and their bias is part of the yaw error.
+A real autopilot closes its position loop on its estimate. The simulated controller receives the true state,
+so the estimate's error is subtracted from the reference instead: for an estimate x̂ = x + e, the control error
+x̂ − x_d equals x − (x_d − e). With position, velocity and yaw so shifted the vehicle flies exactly as if the
+controller had received the estimate. An attitude error tilts the thrust, which adds the acceleration
+−θ × (a − g) to first order, with the attitude error θ as a rotation vector and the requested specific force
+a − g. Body rates are not shifted: the noise of the rate loop's gyros lies far above the motors' bandwidth,
+and their bias is part of the yaw error.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.ground import GRAVITY
 from sitl.vehicle.multirotor import Reference, VehicleState
 
-_JERK_TIME: Final = 0.1
+_JERK_TIME_CONSTANT: Final = 0.1
 """Time constant of the jerk that is derived from a stream of accelerations (s)."""
-_TURN_TIME: Final = 0.03
+_YAW_ACCELERATION_TIME_CONSTANT: Final = 0.03
 """Time constant of the yaw acceleration that is derived from a stream of yaw rates (s)."""
 
 
@@ -44,15 +44,15 @@ class Course:
         self._guidance = guidance
         self._origin = origin
         self._elapsed = 0
-        self._shares = (0, 0.0, 0.0)
+        self._filter_gains = (0, 0.0, 0.0)
         self._acceleration = self._jerk = ZERO
-        self._yaw_rate = self._turning = 0.0
+        self._yaw_rate = self._yaw_acceleration = 0.0
 
     @property
     def reference(self) -> Reference | None:
-        """Requested reference, without the derivatives that are computed from it; None if there is none.
+        """Requested motion without jerk and yaw acceleration; None if the guidance is idle.
 
-        With a firmware's response the motion lags behind it.
+        With a model of a firmware's response the motion of ``next`` lags behind set-points of position.
         """
         guidance = self._guidance
         if guidance.activity is Activity.IDLE:
@@ -62,16 +62,16 @@ class Course:
         return Reference(motion[0], motion[1], motion[2], yaw=yaw, yaw_rate=guidance.yaw_rate)
 
     def next(self, step: int) -> Reference | None:
-        """Return the reference of the next ``step`` µs, once all earlier ones have been flown."""
+        """Return the reference of the next ``step`` µs; call this once per step, in their order."""
         guidance, origin = self._guidance, self._origin
         if guidance.activity is Activity.IDLE:
             self._elapsed = 0
-            self._jerk, self._turning = ZERO, 0.0
+            self._jerk, self._yaw_acceleration = ZERO, 0.0
             return None
         position, velocity, acceleration = guidance.motion
         yaw_rate = guidance.yaw_rate
         if self._elapsed:
-            self._read(acceleration, yaw_rate)
+            self._differentiate(acceleration, yaw_rate)
         self._elapsed, self._acceleration, self._yaw_rate = step, acceleration, yaw_rate
         motion = origin.motion_to_site((position, velocity, acceleration, self._jerk))
         return Reference(
@@ -81,37 +81,40 @@ class Course:
             motion[3],
             yaw=guidance.yaw + origin.turn,
             yaw_rate=yaw_rate,
-            yaw_acceleration=self._turning,
+            yaw_acceleration=self._yaw_acceleration,
         )
 
-    def _read(self, acceleration: Vector, yaw_rate: float) -> None:
-        elapsed, share, turning_share = self._shares
+    def _differentiate(self, acceleration: Vector, yaw_rate: float) -> None:
+        elapsed, gain, yaw_gain = self._filter_gains
         if elapsed != self._elapsed:
             elapsed, t = self._elapsed, self._elapsed * 1e-6
-            share, turning_share = -math.expm1(-t / _JERK_TIME), -math.expm1(-t / _TURN_TIME)
-            self._shares = elapsed, share, turning_share
+            gain, yaw_gain = (
+                -math.expm1(-t / _JERK_TIME_CONSTANT),
+                -math.expm1(-t / _YAW_ACCELERATION_TIME_CONSTANT),
+            )
+            self._filter_gains = elapsed, gain, yaw_gain
         rate = 1e6 / elapsed
         (x, y, z), (u, v, w), (a, b, c) = self._jerk, acceleration, self._acceleration
         self._jerk = (
-            x + share * (rate * (u - a) - x),
-            y + share * (rate * (v - b) - y),
-            z + share * (rate * (w - c) - z),
+            x + gain * (rate * (u - a) - x),
+            y + gain * (rate * (v - b) - y),
+            z + gain * (rate * (w - c) - z),
         )
-        self._turning += turning_share * (rate * (yaw_rate - self._yaw_rate) - self._turning)
+        self._yaw_acceleration += yaw_gain * (rate * (yaw_rate - self._yaw_rate) - self._yaw_acceleration)
 
 
 def believed(reference: Reference, off: Deviation) -> Reference:
-    """Return the reference on the truth that equals ``reference`` on an estimate with the error ``off``."""
+    """Return ``reference`` shifted, so that control on the truth acts as on an estimate with this error."""
     return reference._replace(
         position=reference.position - off.position,
         velocity=reference.velocity - off.velocity,
-        acceleration=reference.acceleration - _tilting(reference.acceleration.tolist(), off),
+        acceleration=reference.acceleration - _tilt_acceleration(reference.acceleration.tolist(), off),
         yaw=reference.yaw - float(off.rotation[2]),
     )
 
 
 class Level(NamedTuple):
-    """Constants of vehicle and controller, over mass, for references without horizontal force."""
+    """Mass, and constants of the controller divided by mass, for references without horizontal force."""
 
     mass: float  # kg
     drag: float  # 1/s, drag coefficient that the controller cancels
@@ -128,28 +131,28 @@ class Level(NamedTuple):
     def unlocated(self, reference: Reference, off: Deviation, state: VehicleState) -> Reference:
         """Return a reference for an estimator without horizontal position and velocity.
 
-        Height and heading are kept; otherwise the vehicle flies level in terms of its estimate, and so drifts
-        with the air. Without an error to correct, the controller would cancel only drag and the force that it
-        has estimated; the acceleration offsets both. The resulting motion of the vehicle must not turn the
-        thrust: jerk and snap cancel the controller's response to an acceleration that was not requested.
+        Height and heading are tracked; horizontally the vehicle flies level in terms of its estimate, and so
+        drifts with the air. The horizontal errors of position and velocity are set to zero; the acceleration
+        offsets the controller's compensation of drag and of the estimated disturbance force. Jerk and snap
+        offset its response to the acceleration that was not requested, so that this does not turn the thrust.
         """
         shifted = believed(reference, off)
         position, velocity = shifted.position.copy(), shifted.velocity.copy()
         jerk, snap = shifted.jerk.copy(), shifted.snap.copy()
         position[:2], velocity[:2] = state.position[:2], state.velocity[:2]
         level = [0.0, 0.0, float(reference.acceleration[2])]
-        acceleration = np.array(level) - _tilting(level, off)
+        acceleration = np.array(level) - _tilt_acceleration(level, off)
         acceleration[:2] += state.learnt_force[:2] / self.mass - self.drag * velocity[:2]
-        pushed = state.acceleration[:2] - acceleration[:2]
-        jerk[:2] = self.k_v * pushed
-        snap[:2] = self.k_x * pushed - self.k_v * jerk[:2]
+        unrequested = state.acceleration[:2] - acceleration[:2]
+        jerk[:2] = self.k_v * unrequested
+        snap[:2] = self.k_x * unrequested - self.k_v * jerk[:2]
         return shifted._replace(
             position=position, velocity=velocity, acceleration=acceleration, jerk=jerk, snap=snap
         )
 
 
-def _tilting(acceleration: list[float], off: Deviation) -> FloatArray:
-    """Return θ × (a − g), (3,) m/s²."""
+def _tilt_acceleration(acceleration: list[float], off: Deviation) -> FloatArray:
+    """Return θ × (a − g), (3,) m/s², from a (m/s², NED) and the attitude error θ in ``off``."""
     x, y, z = off.rotation.tolist()
     a, b, c = acceleration[0], acceleration[1], acceleration[2] - GRAVITY
     return np.array((y * c - z * b, z * a - x * c, x * b - y * a))

@@ -14,9 +14,9 @@ from sitl.estimation.sensors import Estimate
 from sitl.telemetry.status_text import StatusReporter
 from sitl.vehicle.battery import Battery, Charge
 
-_PERIOD: Final = 100_000
+_PERIOD_US: Final = 100_000
 # µs between two reports of the objections to arming; ArduPilot repeats them.
-_AGAIN: Final = 30_000_000
+_REPEAT_US: Final = 30_000_000
 _WORDS: Final = {
     Breach.TOO_LOW: "too low",
     Breach.TOO_HIGH: "too high",
@@ -47,12 +47,12 @@ class Failsafes:
         self._breach = Breach.NONE
         self._breached_at = 0
         self._breaches = 0
-        self._said_at = 0
+        self._reported_at = 0
         self.next_due = 0
 
     @property
     def breached(self) -> bool:
-        """Whether the vehicle is beyond its fence."""
+        """Whether the vehicle was beyond its fence at the last check."""
         return self._breach is not Breach.NONE
 
     def fence_status(self, source: Source) -> FenceStatus:
@@ -74,7 +74,7 @@ class Failsafes:
 
     def watch(self, now: int) -> None:
         """Check battery and fence at ``now`` (µs)."""
-        self.next_due = now + _PERIOD
+        self.next_due = now + _PERIOD_US
         if self._battery is not None:
             self._watch_battery(self._battery.charge, now)
         commander = self._commander
@@ -82,8 +82,8 @@ class Failsafes:
             self._watch_fence(now)
         elif not commander.armed:
             self._breach = Breach.NONE
-        if not commander.armed and self._flavour.repeats_doubts and now - self._said_at >= _AGAIN:
-            self._said_at = now
+        if not commander.armed and self._flavour.repeats_doubts and now - self._reported_at >= _REPEAT_US:
+            self._reported_at = now
             self.say_doubts(now)
 
     def say_doubts(self, now: int) -> None:
@@ -106,7 +106,7 @@ class Failsafes:
             return
         if self._worse_since is None:
             self._worse_since = now
-        if now - self._worse_since >= self._flavour.battery_patience:
+        if now - self._worse_since >= self._flavour.battery_timeout_us:
             self._battery_condition, self._worse_since = condition, None
             self._status_text.warn(
                 f"Battery {condition.word}: {charge.voltage:.1f} V, {100 * charge.remaining:.0f} %"

@@ -34,8 +34,9 @@ class Breach(IntEnum):
 class Rules(NamedTuple):
     """Interpretation of fences by a firmware.
 
-    ``any_area``: it is enough to be inside one inclusion area (PX4), else it must be inside all. ``areas``:
-    whether areas count. ``floor``, ``height`` and ``radius`` (m) are infinite where there is no limit.
+    ``any_area``: the vehicle must be inside one of the inclusion areas (PX4), else inside all. ``areas``:
+    whether areas count. ``floor`` and ``height`` (m above home) and ``radius`` (m around home) are infinite
+    where there is no limit.
     """
 
     enabled: bool
@@ -70,7 +71,7 @@ _NO_ITEMS: Final[tuple[Item, ...]] = ()
 
 
 class Fences:
-    """Fence of ``plans``, and a cylinder around home."""
+    """Fence areas of ``plans``, and a cylinder around home."""
 
     def __init__(self, plans: Plans, origin: Origin, home: Home) -> None:
         self._plans = plans
@@ -81,11 +82,11 @@ class Fences:
 
     @property
     def uploaded(self) -> bool:
-        """Whether fence areas have been uploaded."""
+        """Whether a fence has been uploaded; a return point alone counts too."""
         return bool(self._plans.items(Type.FENCE))
 
     def breach(self, position: Vector, rules: Rules) -> Breach:
-        """Return the limit that ``position`` (m, local NED) exceeds."""
+        """Return the first limit that ``position`` (m, local NED) exceeds, height first, or NONE."""
         x, y, z = position
         if -z - self._home.height > rules.height:
             return Breach.TOO_HIGH
@@ -93,19 +94,19 @@ class Fences:
             return Breach.TOO_LOW
         if math.dist(self._home.position[:2], (x, y)) > rules.radius:
             return Breach.BOUNDARY
-        areas = self._known() if rules.areas else ()
+        areas = self._parsed() if rules.areas else ()
         within = [area.holds(x, y) for area in areas if area.stay_in]
         kept_in = not within or (any(within) if rules.any_area else all(within))
         kept_out = not any(area.holds(x, y) for area in areas if not area.stay_in)
         return Breach.NONE if kept_in and kept_out else Breach.BOUNDARY
 
-    def _known(self) -> tuple[_Area, ...]:
+    def _parsed(self) -> tuple[_Area, ...]:
         items = self._plans.items(Type.FENCE)
         if items is not self._items:
-            self._items, self._areas = items, tuple(self._read(items))
+            self._items, self._areas = items, tuple(self._parse(items))
         return self._areas
 
-    def _read(self, items: Sequence[Item]) -> list[_Area]:
+    def _parse(self, items: Sequence[Item]) -> list[_Area]:
         areas: list[_Area] = []
         at = 0
         while at < len(items):

@@ -20,8 +20,8 @@ from sitl.vehicle.battery import Battery
 class FlightControl:
     """Parts that decide on arming and modes.
 
-    ``steering`` receives set-points. ``failsafes`` watch, and order the ``commander``; ``maneuvers`` are the
-    commands that fly somewhere.
+    ``steering`` receives set-points. ``failsafes`` monitors battery and fence, and changes the mode of the
+    ``commander``; ``maneuvers`` handles commands such as DO_REPOSITION.
     """
 
     def __init__(

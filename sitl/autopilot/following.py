@@ -16,12 +16,12 @@ from sitl.values.origin import Origin
 from sitl.values.setpoints import POSITION, ZERO, Pose, Setpoint, rotated
 
 # Speed (m/s) below which the leader has no course.
-_MOVING: Final = 0.3
+_MIN_COURSE_SPEED: Final = 0.3
 # Distance (m) below which there is no bearing to turn to.
-_NEAR: Final = 1.0
+_MIN_BEARING_DISTANCE: Final = 1.0
 # PX4 has no limit of its own; a leader at a greater distance (m) is treated as corrupt data.
-_FARTHEST: Final = 1000.0
-_FIRM: Final = (POSITION, POSITION, POSITION)
+_MAX_DISTANCE: Final = 1000.0
+_POSITION_LEVELS: Final = (POSITION, POSITION, POSITION)
 
 
 class Following:
@@ -30,9 +30,11 @@ class Following:
     def __init__(
         self, guidance: Guidance, origin: Origin, home: Home, config: FollowConfig, *, px4: bool
     ) -> None:
-        """Set the leader's protocol by ``px4``.
+        """Set the rules of the firmware.
 
-        If set, only FOLLOW_TARGET counts, and the station is given by distance, angle and height.
+        ``px4``: FOLLOW_TARGET from any sender counts, GLOBAL_POSITION_INT does not, and the station is given
+        by distance, angle and height. Otherwise both count if they come from the chosen system (0: the first
+        sender), and the station is an offset.
         """
         self._guidance = guidance
         self._origin = origin
@@ -67,17 +69,17 @@ class Following:
 
         A report is ignored if it does not come from the leader, or if the leader is out of range.
         """
-        if not self._is_meant(message):
+        if not self._is_from_leader(message):
             return
         self._system = self._system or message.source.system
         there, velocity = self._motion(message)
-        if math.dist(there, here.position) > (_FARTHEST if self._px4 else self._config.limit):
+        if math.dist(there, here.position) > (_MAX_DISTANCE if self._px4 else self._config.limit):
             return
         self._received = now
         station = self._station(there, message, velocity, here)
         north, east = there[0] - here.position[0], there[1] - here.position[1]
-        yaw = math.atan2(east, north) if math.hypot(north, east) > _NEAR else None
-        setpoint = Setpoint(_FIRM, station, velocity, yaw=yaw, complete=True)
+        yaw = math.atan2(east, north) if math.hypot(north, east) > _MIN_BEARING_DISTANCE else None
+        setpoint = Setpoint(_POSITION_LEVELS, station, velocity, yaw=yaw, complete=True)
         self._guidance.track(setpoint, now, None, here, now)
 
     def advance(self, now: int) -> None:
@@ -86,7 +88,7 @@ class Following:
         if lost and self._guidance.activity is Activity.TRACK:
             self._guidance.hold()
 
-    def _is_meant(self, message: FollowTarget | GlobalPosition) -> bool:
+    def _is_from_leader(self, message: FollowTarget | GlobalPosition) -> bool:
         if self._px4:
             return isinstance(message, FollowTarget)
         return self._system in (0, message.source.system)
@@ -94,7 +96,8 @@ class Following:
     def _motion(self, message: FollowTarget | GlobalPosition) -> tuple[Vector, Vector]:
         """Return position (m) and velocity (m/s), local NED.
 
-        Heights count from each vehicle's own home, as by default.
+        GLOBAL_POSITION_INT: the leader's height above its home is applied above the own home, as by default;
+        FOLLOW_TARGET: the altitude above sea level counts.
         """
         x, y, z = self._origin.local(message.latitude, message.longitude, message.altitude)
         if isinstance(message, GlobalPosition):
@@ -106,7 +109,7 @@ class Following:
         self, there: Vector, message: FollowTarget | GlobalPosition, velocity: Vector, here: Pose
     ) -> Vector:
         config = self._config
-        if math.hypot(velocity[0], velocity[1]) > _MOVING:
+        if math.hypot(velocity[0], velocity[1]) > _MIN_COURSE_SPEED:
             self._course = math.atan2(velocity[1], velocity[0])
         if self._px4:
             bearing = self._course + math.radians(config.angle)

@@ -86,7 +86,7 @@ class Guidance:
 
     @property
     def commanded(self) -> Motion:
-        """Motion requested by set-points now, or the motion itself if there are none."""
+        """Motion requested now by set-points that bypass the shaper; otherwise ``motion``."""
         return self._commanded if self._commanded is not None and self._unshaped else self.motion
 
     @property
@@ -109,10 +109,10 @@ class Guidance:
         return abs(gap) < _REACHED[0] and math.hypot(*self._shaper.velocity) < _REACHED[1]
 
     def wanted(self, now: int) -> Setpoint:
-        """Return the set-point to follow at ``now`` (µs).
+        """Return the set-point to follow at ``now`` (µs), for the activities GO and TRACK.
 
-        That of GO is returned unchanged. With a model of a firmware's response it is extrapolated for
-        ArduPilot only, and not limited. Otherwise it is extrapolated and within the limits.
+        The destination of GO is returned unchanged. A set-point that bypasses the shaper is not limited, and
+        extrapolated for ArduPilot only. Other set-points are extrapolated and limited.
         """
         config = self._config
         age = (now - self._received) * 1e-6
@@ -164,7 +164,7 @@ class Guidance:
             self._limits[Activity.GO] = self._limits[Activity.GO]._replace(speed=speed)
 
     def turn_to(self, yaw: float) -> None:
-        """Turn to ``yaw`` (rad), until something else sets the yaw."""
+        """Turn to ``yaw`` (rad), until another activity or set-point begins."""
         self._setpoint = self._setpoint._replace(yaw=yaw, yaw_rate=None)
 
     @property

@@ -17,15 +17,15 @@ from sitl.telemetry.status_text import StatusReporter
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 
-# Greatest accepted distance of home (m); a larger one is an error.
-_FAR: Final = 100_000.0
+# Greatest accepted distance of home from the origin, and magnitude of its altitude (m).
+_MAX_DISTANCE: Final = 100_000.0
 
 
 class HomeCommands:
     """Handler that moves ``home``, and reports it after every change.
 
-    The origin of a filter that has one is fixed, as on a real ArduPilot; a request to set it is answered with
-    the present origin.
+    The origin of the filter is fixed, as on a real ArduPilot that has one; a request to set the origin is
+    refused, and answered with the present origin.
     """
 
     def __init__(
@@ -77,9 +77,9 @@ class HomeCommands:
         return self._move(latitude, longitude, altitude)
 
     def _move(self, latitude: float, longitude: float, altitude: float) -> CommandRefusal | None:
-        if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and abs(altitude) <= _FAR):
+        if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and abs(altitude) <= _MAX_DISTANCE):
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Home refused: no such place on the globe")
-        if math.dist(self._origin.local(latitude, longitude, altitude), (0.0, 0.0, 0.0)) > _FAR:
+        if math.dist(self._origin.local(latitude, longitude, altitude), (0.0, 0.0, 0.0)) > _MAX_DISTANCE:
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Home refused: more than 100 km from here")
         self._home.move(latitude, longitude, altitude)
         self._telemetry.request(mavlink.MAVLINK_MSG_ID_HOME_POSITION)

@@ -18,17 +18,17 @@ from sitl.estimation.sensors import Estimate
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 
-# Air and ground speed are equal, because plans ignore wind.
-_LEVEL: Final = (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED)
+# Air and ground speed are treated alike, because guidance ignores wind.
+_HORIZONTAL: Final = (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED)
 _VERTICAL: Final = (mavlink.SPEED_TYPE_CLIMB_SPEED, mavlink.SPEED_TYPE_DESCENT_SPEED)
-# DO_CHANGE_SPEED: no change, default speed.
-_SAME, _USUAL = -1.0, -2.0
-_FASTEST: Final = 100.0
-_LAST: Final = (90.0, 180.0)
+# Values of parameter 2 of DO_CHANGE_SPEED.
+_NO_CHANGE, _DEFAULT_SPEED = -1.0, -2.0
+_MAX_SPEED: Final = 100.0
+_MAX_LATITUDE_LONGITUDE: Final = (90.0, 180.0)
 
 
 class Maneuvers:
-    """Handlers of these commands: ``commands`` by MAV_CMD.
+    """Handlers of commands in flight: ``commands`` by MAV_CMD.
 
     Commands that a firmware does not support are answered with UNSUPPORTED, as by the real one.
     """
@@ -95,15 +95,15 @@ class Maneuvers:
     def _change_speed(self, order: Order) -> CommandRefusal | None:
         """Change the horizontal speed until another mode is entered."""
         kind, speed = order.params[:2]
-        if speed == _SAME:
+        if speed == _NO_CHANGE:
             return None
         if kind in _VERTICAL:
             return CommandRefusal(
                 mavlink.MAV_RESULT_UNSUPPORTED, "Speed refused: only the level one can be changed"
             )
-        if kind not in _LEVEL or not (speed == _USUAL or 0.0 < speed <= _FASTEST):
+        if kind not in _HORIZONTAL or not (speed == _DEFAULT_SPEED or 0.0 < speed <= _MAX_SPEED):
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Speed refused: 0 to 100 m/s of kind 0 or 1")
-        wanted = None if speed == _USUAL else speed
+        wanted = None if speed == _DEFAULT_SPEED else speed
         self._speed = None if wanted is None else (self._commander.mode, wanted)
         if self._commander.mode is Mode.MISSION:
             self._itinerary.set_speed(wanted)
@@ -174,7 +174,10 @@ class Maneuvers:
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Reposition refused: this frame is not known")
         if not self._flavour.stops and (order.nowhere or not math.isfinite(latitude + longitude)):
             x, y, level = here[0], here[1], 0.0
-        elif not (abs(latitude) <= _LAST[0] and abs(longitude) <= _LAST[1]) or latitude == longitude == 0.0:
+        elif (
+            not (abs(latitude) <= _MAX_LATITUDE_LONGITUDE[0] and abs(longitude) <= _MAX_LATITUDE_LONGITUDE[1])
+            or latitude == longitude == 0.0
+        ):
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Reposition refused: no such place on the globe")
         else:
             # Height of level ground there, which the Earth's curvature lowers.
@@ -189,7 +192,7 @@ class Maneuvers:
         return x, y, level - (altitude + above - self._origin.altitude)
 
     def _leg_speed(self, asked: float) -> float:
-        if 0.0 < asked <= _FASTEST:
+        if 0.0 < asked <= _MAX_SPEED:
             return asked
         mode, speed = self._speed or (None, 0.0)
         return speed if mode is self._commander.mode else self._commander.level_speed

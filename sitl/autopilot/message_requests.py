@@ -15,8 +15,8 @@ from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.streams import members
 
 _LAST_ID: Final = 0xFFFF
-# µs, half an hour: the largest interval that fits into MESSAGE_INTERVAL.
-_LONGEST: Final = 0x7FFFFFFF
+# 36 min: the largest interval that fits into MESSAGE_INTERVAL.
+_MAX_INTERVAL_US: Final = 0x7FFFFFFF
 
 
 class Requests:
@@ -72,7 +72,7 @@ class Requests:
             return CommandRefusal(
                 mavlink.MAV_RESULT_FAILED, f"Interval refused: {interval:.0f} us is too short"
             )
-        wanted = min(round(interval), _LONGEST)
+        wanted = min(round(interval), _MAX_INTERVAL_US)
         if not self._telemetry.set_interval(int(message_id), wanted, order.now):
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Interval refused: no message {message_id:.0f}")
         return None

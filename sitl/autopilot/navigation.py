@@ -18,8 +18,8 @@ from sitl.values.origin import Origin
 class Navigation:
     """Parts that determine where the vehicle flies.
 
-    ``guidance`` makes the reference. ``itinerary`` flies the missions of ``plans``, ``following`` follows a
-    target; ``modes`` selects among them and the return to ``home``.
+    ``guidance`` generates the reference. ``itinerary`` flies the mission of ``plans``, ``following`` follows
+    a leader; ``modes`` selects among these two and the return to ``home``.
     """
 
     def __init__(self, config: AutopilotConfig, firmware: Firmware, origin: Origin, saved: Saved) -> None:

@@ -22,7 +22,7 @@ from sitl.vehicle.multirotor import Reference, VehicleState
 
 # The reference is renewed at least this often (µs), because real position loops run at 50 to 100 Hz; the
 # vehicle's controller extrapolates it in between.
-_RENEWAL: Final = 10_000
+_RENEWAL_US: Final = 10_000
 
 
 class Plant:
@@ -38,12 +38,12 @@ class Plant:
         weather: WeatherConfig,
         guidance: Guidance,
         origin: Origin,
-        patience: float,
+        position_timeout: float,
         seed: int,
     ) -> None:
         """Start at rest at ``origin``, or at the height above it in ``config``.
 
-        ``patience`` and ``seed`` are those of ``Sensors``.
+        ``position_timeout`` and ``seed`` are those of ``Sensors``.
         """
         ground = float(origin.position[2]) + vehicle.rest_height
         start = origin.motion_to_site([(0.0, 0.0, -config.start_height)])[0]
@@ -52,7 +52,7 @@ class Plant:
         self.vehicle = physics(config.physics, vehicle, begin, origin.site, weather, seed, config.system_id)
         self.course = Course(guidance, origin)
         profile = PROFILES[config.sensors]
-        self.sensors = Sensors(profile, origin, self.vehicle.state, patience, seed, config.system_id)
+        self.sensors = Sensors(profile, origin, self.vehicle.state, position_timeout, seed, config.system_id)
         air = Weather(weather, seed, config.system_id)
         self._weather = None if air.still else air
         self._guidance = guidance
@@ -60,18 +60,18 @@ class Plant:
         self._ground = ground
         self._level = Level.of(vehicle)
         self._period = vehicle.physics_period
-        self._stride = max(1, _RENEWAL // self._period)
+        self._stride = max(1, _RENEWAL_US // self._period)
         self._resets = 0
         self._steps = 0
-        self._truth: VehicleState | None = None
-        self._belief: Estimate | None = None
+        self._state: VehicleState | None = None
+        self._estimate: Estimate | None = None
         self._trace: list[npt.NDArray[np.float64]] = []
         self._trace_start = 0
 
     def move(self, now: int, *, armed: bool) -> None:
         """Run all physics steps that end by ``now`` (µs, not decreasing).
 
-        The reference is renewed on a fixed grid. Without one the motors stand still, or idle when ``armed``.
+        The reference is renewed on a fixed grid. Without a reference the motors stop, or idle if ``armed``.
         """
         vehicle, guidance, period, stride = self.vehicle, self._guidance, self._period, self._stride
         if not armed:
@@ -86,12 +86,12 @@ class Plant:
             wind = self._air(begin)
             reference = self.course.next(step)
             if reference is not None and not self.sensors.exact:
-                reference = self._believed(reference)
+                reference = self._shifted(reference)
             idle = armed and reference is None
             self._trace.append(vehicle.advance(count, reference, wind, idle=idle))
             guidance.advance(begin, step, self._local(wind), self.sensors.drift)
             self._steps += count
-            self._truth = self._belief = None
+            self._state = self._estimate = None
             if not self.sensors.exact:
                 self._sense()
 
@@ -103,9 +103,9 @@ class Plant:
     @property
     def state(self) -> VehicleState:
         """True state after the last physics step; it is cached, so do not modify it."""
-        if self._truth is None:
-            self._truth = self.vehicle.state
-        return self._truth
+        if self._state is None:
+            self._state = self.vehicle.state
+        return self._state
 
     @property
     def wind(self) -> Vector:
@@ -114,9 +114,9 @@ class Plant:
 
     def estimate(self) -> Estimate:
         """Return the estimated state."""
-        if self._belief is None:
-            self._belief = self.sensors.estimate(self.state)
-        return self._belief
+        if self._estimate is None:
+            self._estimate = self.sensors.estimate(self.state)
+        return self._estimate
 
     @property
     def estimate_error(self) -> npt.NDArray[np.float64]:
@@ -147,7 +147,7 @@ class Plant:
         self.sensors.lose_gps(self.time, self.state)
 
     def shift_gps(self, offset: Vector) -> None:
-        """Set the total GPS error to ``offset`` (m, local NED)."""
+        """Set the error of GPS positions to ``offset`` (m, local NED); zero ends the fault."""
         self.sensors.shift_gps(offset, self.time, self.state)
 
     # Within a stride
@@ -165,8 +165,8 @@ class Plant:
         """Convert a velocity from site NED to the vehicle's local NED."""
         return wind if wind == ZERO else self._origin.vector_to_local(np.array(wind))
 
-    def _believed(self, reference: Reference) -> Reference:
-        """Return the reference that makes the physics fly as on the estimate."""
+    def _shifted(self, reference: Reference) -> Reference:
+        """Return ``reference`` shifted such that the vehicle flies as if controlled on its estimate."""
         off = self.sensors.deviation(self.state)
         if self.sensors.gps.located:
             return believed(reference, off)

@@ -22,7 +22,7 @@ class Response(Protocol):
     def desired(self) -> Motion:
         """Motion of the trajectory that the firmware derives from the set-points.
 
-        The activity after the set-points continues from it.
+        The activity after the set-points continues from this motion.
         """
 
     def configure(self, config: AutopilotConfig) -> None:
@@ -35,7 +35,7 @@ class Response(Protocol):
         """Handle a jump of the estimate to ``position`` and ``velocity``, and continue from there."""
 
     def advance(self, wanted: Motion, dt: float, wind: Vector = ..., drift: Vector = ...) -> None:
-        """Advance by ``dt`` seconds towards ``wanted``, which is valid at their end.
+        """Advance by ``dt`` seconds towards ``wanted``, which is valid at the end of the step.
 
         ``wind`` (m/s) is the velocity of the air. The estimated position moves by ``drift`` (m/s) more than
         the velocity indicates.

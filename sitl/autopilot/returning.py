@@ -12,8 +12,8 @@ from sitl.config.autopilot import AutopilotConfig
 from sitl.estimation.sensors import Estimate
 from sitl.values.home import Home
 
-_THERE: Final = 0.5  # m
-_NEAR: Final = 1.0
+_ARRIVAL_DISTANCE: Final = 0.5  # m
+_MIN_BEARING_DISTANCE: Final = 1.0  # m, below which the yaw is kept
 
 
 class _Stage(Enum):
@@ -27,8 +27,8 @@ class _Stage(Enum):
 class Returning:
     """RTL of both firmwares.
 
-    The vehicle climbs to the return height, or keeps its height if that is greater, flies over home, and
-    lands.
+    The vehicle climbs to the return height above home, or keeps its height if that is greater, flies over
+    home, pauses and lands. With a negative ``return_pause`` it stays over home.
     """
 
     def __init__(self, guidance: Guidance, home: Home, config: AutopilotConfig) -> None:
@@ -64,7 +64,7 @@ class Returning:
             if self._stage is _Stage.CLIMB:
                 x, y, _ = self._home.position
                 north, east = x - here.position[0], y - here.position[1]
-                yaw = math.atan2(east, north) if math.hypot(north, east) > _NEAR else None
+                yaw = math.atan2(east, north) if math.hypot(north, east) > _MIN_BEARING_DISTANCE else None
                 self._go((x, y, self._target[2]), self._config.waypoint_speed, yaw, here)
                 self._stage = _Stage.OVER
             else:
@@ -72,7 +72,7 @@ class Returning:
                 self._stage = _Stage.PAUSE
 
     def _is_there(self, here: Estimate) -> bool:
-        return math.dist(here.position, self._target) <= _THERE
+        return math.dist(here.position, self._target) <= _ARRIVAL_DISTANCE
 
     def _go(self, target: Vector, speed: float, yaw: float | None, here: Estimate) -> None:
         self._target = target

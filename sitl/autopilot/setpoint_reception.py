@@ -23,9 +23,9 @@ from sitl.values.setpoints import IGNORE_POSITION, POSITION, ZERO, Pose, Reading
 
 _SECOND: Final = 1_000_000
 # Rise (m), climb rate (m/s) or acceleration (m/s²) above which a set-point lifts the vehicle off the ground.
-_RISING: Final = (0.2, 0.1, 0.1)
+_LIFT_OFF: Final = (0.2, 0.1, 0.1)
 # Pause (µs) after which a set-point begins a new stream.
-_PAUSE: Final = 2 * _SECOND
+_STREAM_PAUSE_US: Final = 2 * _SECOND
 
 
 class Stream(NamedTuple):
@@ -41,9 +41,9 @@ class Stream(NamedTuple):
 
     @property
     def gap(self) -> float:
-        """Seconds between the last two; 0 for the first of a stream."""
+        """Seconds between the last two set-points; 0 if the newest is the first of a stream."""
         gap = self.newest - self.older
-        return gap / _SECOND if gap < _PAUSE else 0.0
+        return gap / _SECOND if gap < _STREAM_PAUSE_US else 0.0
 
 
 class SetpointReception:
@@ -69,7 +69,7 @@ class SetpointReception:
     ) -> bool:
         """Handle one set-point addressed to this vehicle that arrived at ``now`` (µs).
 
-        Return whether it can be flown.
+        Return whether the set-point is usable; whether it is followed depends on mode and activity.
         """
         reading = self._read(message, here)
         if not isinstance(reading, Setpoint):
@@ -87,7 +87,7 @@ class SetpointReception:
         return True
 
     def resume(self, here: Pose, now: int) -> None:
-        """Follow the newest set-point of a stream that began before it could take effect, or hold."""
+        """Follow the newest set-point if the firmware accepts it from before GUIDED (PX4), else hold."""
         setpoint = self.stream.setpoint
         if self._flavour.stream_first and setpoint is not None:
             self._follow(setpoint, here, now)
@@ -113,7 +113,7 @@ def _rises(setpoint: Setpoint, here: Pose) -> bool:
     """Return whether a set-point leads off the ground."""
     level = setpoint.levels[2]
     z = (setpoint.position, setpoint.velocity, setpoint.acceleration)[level][2]
-    return (here.position[2] if level == POSITION else 0.0) - z > _RISING[level]
+    return (here.position[2] if level == POSITION else 0.0) - z > _LIFT_OFF[level]
 
 
 def _localised(

@@ -1,4 +1,4 @@
-"""Shaping of references: their speed, acceleration and jerk are bounded, so that they can be flown.
+"""Shaping of references: acceleration and jerk of the approach are bounded, and its speed is controlled.
 
 The geometric controller must never receive a step. ``Shaper`` is a point mass that approaches the set-point:
 far away it keeps to a speed limit, closer it brakes on v² = 2 a d, and at the end it converges exponentially.
@@ -25,8 +25,8 @@ _RELEASE: Final = (0.5, 1.0)  # m, m/s
 _AT_REST: Final = (1e-5, 1e-4)  # m/s, m/s²
 
 _YAW_RATES: Final = (6.0, 12.0)  # 1/s, of the yaw's final convergence and of its rate
-_TURNED: Final = 1e-6  # rad/s
-_TURN: Final = 2.0 * math.pi
+_MIN_YAW_RATE: Final = 1e-6  # rad/s
+_FULL_TURN: Final = 2.0 * math.pi
 
 
 class Limits(NamedTuple):
@@ -55,11 +55,11 @@ class Shaper:
 
     @property
     def at_rest(self) -> bool:
-        """Whether it has stopped, within tolerances that a controller cannot detect."""
+        """Whether speed and acceleration are below ``_AT_REST``, which no controller can detect."""
         return math.hypot(*self.velocity) < _AT_REST[0] and math.hypot(*self.acceleration) < _AT_REST[1]
 
     def advance(self, wanted: Setpoint, limits: Limits, dt: float) -> None:
-        """Advance by ``dt`` seconds; ``wanted`` is valid at their end."""
+        """Advance by ``dt`` seconds; ``wanted`` is valid at the end of the step."""
         if wanted.complete and self._follows(wanted, dt):
             self.position, self.velocity, self.acceleration = (
                 wanted.position,
@@ -78,8 +78,8 @@ class Shaper:
         gap = math.hypot(
             gx - x - vx * dt - ax * half, gy - y - vy * dt - ay * half, gz - z - vz * dt - az * half
         )
-        slip = math.hypot(ux - vx - ax * dt, uy - vy - ay * dt, uz - vz - az * dt)
-        self.captured = gap <= distance and slip <= speed
+        speed_error = math.hypot(ux - vx - ax * dt, uy - vy - ay * dt, uz - vz - az * dt)
+        self.captured = gap <= distance and speed_error <= speed
         return self.captured
 
     def _demand(self, wanted: Setpoint, limits: Limits, dt: float) -> Vector:
@@ -123,10 +123,10 @@ class Shaper:
             limits.acceleration,
         )
 
-    def _integrate(self, demand: Vector, most: float, dt: float) -> None:
-        """Change the acceleration towards ``demand`` by at most ``most``, then integrate it over the step."""
+    def _integrate(self, demand: Vector, limit: float, dt: float) -> None:
+        """Change the acceleration towards ``demand`` by at most ``limit``, then integrate over the step."""
         ax, ay, az = self.acceleration
-        dx, dy, dz = _clipped((demand[0] - ax, demand[1] - ay, demand[2] - az), most)
+        dx, dy, dz = _clipped((demand[0] - ax, demand[1] - ay, demand[2] - az), limit)
         ax, ay, az = ax + dx, ay + dy, az + dz
         half = 0.5 * dt * dt
         x, y, z = self.position
@@ -149,12 +149,13 @@ class Heading:
         self.yaw_rate = 0.0
 
     def advance(self, yaw: float | None, yaw_rate: float | None, dt: float) -> None:
-        """Turn the short way to ``yaw`` (rad), which itself turns at ``yaw_rate`` (rad/s).
+        """Turn the short way to ``yaw`` (rad), which itself turns at ``yaw_rate`` (rad/s), in ``dt`` seconds.
 
-        None for both means: stop turning.
+        ``yaw`` is valid at the end of the step. Without it only the rate is tracked; None for both stops the
+        turn.
         """
         wanted = yaw_rate or 0.0
-        error = 0.0 if yaw is None else math.remainder(yaw - wanted * dt - self.yaw, _TURN)
+        error = 0.0 if yaw is None else math.remainder(yaw - wanted * dt - self.yaw, _FULL_TURN)
         if error == 0.0 and wanted == 0.0 and self.yaw_rate == 0.0:
             return
         near, quick = _YAW_RATES
@@ -164,9 +165,9 @@ class Heading:
         change = push + quick * (aim - self.yaw_rate)
         change = max(-self._acceleration, min(self._acceleration, change))
         self.yaw_rate += change * dt
-        if wanted == 0.0 and error == 0.0 and abs(self.yaw_rate) < _TURNED:
+        if wanted == 0.0 and error == 0.0 and abs(self.yaw_rate) < _MIN_YAW_RATE:
             self.yaw_rate = 0.0
-        self.yaw = math.remainder(self.yaw + self.yaw_rate * dt, _TURN)
+        self.yaw = math.remainder(self.yaw + self.yaw_rate * dt, _FULL_TURN)
 
 
 def _approach(distance: float, rate: float, braking: float, speed: float) -> tuple[float, float]:
@@ -181,10 +182,10 @@ def _approach(distance: float, rate: float, braking: float, speed: float) -> tup
     return (wanted / distance, braking / wanted) if wanted < speed else (speed / distance, 0.0)
 
 
-def _clipped(vector: Vector, most: float) -> Vector:
+def _clipped(vector: Vector, limit: float) -> Vector:
     x, y, z = vector
     norm = math.sqrt(x * x + y * y + z * z)
-    if norm <= most:
+    if norm <= limit:
         return vector
-    factor = most / norm
+    factor = limit / norm
     return x * factor, y * factor, z * factor

@@ -10,10 +10,10 @@ from mavlink_bridge.wire.signing import LATEST, Signing
 from sitl.telemetry.status_text import StatusReporter
 
 # µs between two warnings about rejected messages.
-_PAUSE: Final = 5_000_000
+_WARNING_INTERVAL_US: Final = 5_000_000
 
 
-class Trust:
+class SigningSetup:
     """Handler that passes keys to ``signing``.
 
     As on real firmwares, a key message must address this vehicle alone, and none is accepted while armed. If
@@ -29,7 +29,7 @@ class Trust:
         armed: Callable[[], bool],
         status_text: StatusReporter,
     ) -> None:
-        """Without ``signing`` every message is accepted, and no key."""
+        """Set the rules; without ``signing`` every message is accepted and every key refused."""
         self._source = source
         self._signing = signing
         self._obeys = setup == "obeyed"
@@ -70,5 +70,5 @@ class Trust:
             return
         refused = sum(signing.refused.values())
         if refused != self._refused:
-            self._refused, self._next = refused, now + _PAUSE
+            self._refused, self._next = refused, now + _WARNING_INTERVAL_US
             self._status_text.warn(f"Messages do not count: {signing.latest.value}")

@@ -1,6 +1,6 @@
 """Engine of the JSBSim backend with one vehicle: it takes motor commands and wind and gives measured motion.
 
-JSBSim is imported when the first engine is made. It comes with the extra ``sitl``, where a wheel exists.
+JSBSim is imported when the first engine is made. The extra ``sitl`` installs JSBSim where a wheel exists.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _POSITIONS: Final = {
     "simulation/integrator/position/translational": _ADAMS_BASHFORTH_3,
 }
 _MILSPEC: Final = 3.0
-_QUIET: Final = "JSBSIM_DEBUG"
+_DEBUG_VARIABLE: Final = "JSBSIM_DEBUG"
 
 
 class Air(NamedTuple):
@@ -206,12 +206,12 @@ def _loaded(config: VehicleConfig, *, isa: bool) -> Any:
 @contextmanager
 def _silence() -> Iterator[None]:
     """Suppress JSBSim's output; JSBSim reads the debug level from the environment when it is created."""
-    before = os.environ.get(_QUIET)
-    os.environ[_QUIET] = "0"
+    before = os.environ.get(_DEBUG_VARIABLE)
+    os.environ[_DEBUG_VARIABLE] = "0"
     try:
         yield
     finally:
         if before is None:
-            del os.environ[_QUIET]
+            del os.environ[_DEBUG_VARIABLE]
         else:
-            os.environ[_QUIET] = before
+            os.environ[_DEBUG_VARIABLE] = before

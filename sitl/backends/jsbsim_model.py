@@ -23,10 +23,10 @@ FOOT: Final = 0.3048
 POUND: Final = 0.45359237 * 9.80665
 """One pound-force (N)."""
 
-_STIFFEST: Final = 50.0
+_MAX_FREQUENCY: Final = 50.0
 """Upper limit of the landing gear's natural frequency (rad/s): a static deflection of 4 mm."""
-_STIFFEST_PER_STEP: Final = 0.4
-"""Upper limit of its phase per physics step (rad), for JSBSim's explicit integration."""
+_MAX_PHASE_PER_STEP: Final = 0.4
+"""Upper limit of that frequency times the physics step (rad), for JSBSim's explicit integration."""
 _LEGS: Final = 4
 _AT_REST: Final = 1e-3
 _TIP_SHARE: Final = 0.1
@@ -91,7 +91,7 @@ def _place(parent: Element, body: tuple[float, float, float], **attributes: str)
 def _ground_reactions(root: Element, config: VehicleConfig) -> None:
     """Add legs that carry the weight at the rest height, and rotor tips for a vehicle that falls over."""
     reactions = SubElement(root, "ground_reactions")
-    frequency = min(_STIFFEST, _STIFFEST_PER_STEP / (config.physics_period * 1e-6))
+    frequency = min(_MAX_FREQUENCY, _MAX_PHASE_PER_STEP / (config.physics_period * 1e-6))
     stiffness = config.mass * frequency**2
     damping = 2.0 * config.mass * frequency
     # Each spring deflects under the weight by as much as its foot is lower.

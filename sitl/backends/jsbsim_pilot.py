@@ -132,13 +132,13 @@ def _build(digest: int) -> tuple[_Steer, _Sense]:
             put_three(state, 20, still)
             put_three(state, 23, still)
             return True
-        _, _, sound, sound_moment = wrench(speeds, left, still, still, airframe)
+        _, _, intact_thrust, intact_moment = wrench(speeds, left, still, still, airframe)
         known, turn = observed(
             (three_at(state, 20), three_at(state, 23)),
             times(POUND, three_at(measured, 14)),
             times(POUND * FOOT, three_at(measured, 17)),
-            sound,
-            sound_moment,
+            intact_thrust,
+            intact_moment,
             to_body(axes, velocity),
             rates,
             axes,
@@ -173,9 +173,9 @@ _steer, _sense = _build(
 def steer(
     state: FloatArray, command: FloatArray, airframes: NDArray[np.void], t: float, commanded: FloatArray
 ) -> None:
-    """Write the motors' commanded speeds (n,) (rad/s) ``t`` seconds into a command row.
+    """Write the motors' commanded speeds (n,) (rad/s), ``t`` seconds after the start of a command row.
 
-    ``airframes`` (1,) is the record.
+    ``airframes`` (1,) is the record of ``airframe_record``.
     """
     _steer(state, command, airframes, t, commanded)
 
@@ -189,6 +189,6 @@ def sense(
 ) -> bool:
     """Update a state row from the ``measured`` row after a step under a command row.
 
-    Return False, and change nothing, if the measured row is not finite.
+    ``place`` is a place row. Return False, and change nothing, if the measured row is not finite.
     """
     return _sense(state, measured, place, command, airframes)

@@ -1,4 +1,4 @@
-"""Selection of a vehicle's physics backend by its configuration."""
+"""Selection of a vehicle's physics backend by name."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from sitl.vehicle.airframe import FloatArray
 from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.multirotor import Vehicle, initial_states
 
-_STREAM: Final = 0x4A
-_CURVES: Final[dict[Severity, int]] = {"light": 3, "moderate": 4, "severe": 6}
-"""Curves of figure 7 of MIL-F-8785C, which JSBSim uses above 1000 feet."""
+# Separates these random numbers from those of the vehicle's sensors and weather, which have the same seeds.
+_RNG_STREAM_ID: Final = 0x4A
+# JSBSim's severity index: the curve of figure 7 of MIL-F-8785C, which JSBSim uses above 1000 feet.
+_SEVERITY_INDEX: Final[dict[Severity, int]] = {"light": 3, "moderate": 4, "severe": 6}
 
 
 class Start(NamedTuple):
@@ -25,7 +26,7 @@ class Start(NamedTuple):
     position: FloatArray  # (3,) m, site NED
     yaw: float  # rad, site NED
     ground: float  # m, site NED, the z of the ground below it
-    hovering: bool  # in the air, rather than with motors off
+    hovering: bool  # at hover speed of the motors in the air; False: motors off
 
 
 def physics(
@@ -37,10 +38,11 @@ def physics(
     seed: int,
     system_id: int,
 ) -> Physics:
-    """Return the vehicle in ``site``; ``seed`` (≥ 0) and ``system_id`` seed JSBSim's turbulence.
+    """Return the vehicle with the physics ``name``.
 
-    Raises ValueError for a hover position on the ground or weather that this physics does not support,
-    ModuleNotFoundError without JSBSim, and BackendError.
+    ``seed`` (≥ 0) and ``system_id`` seed JSBSim's turbulence. ``site`` is the frame of ``start``; only JSBSim
+    uses it. Raises ValueError for a hover position on the ground or for weather that needs JSBSim; with
+    JSBSim also ModuleNotFoundError if it is not installed, and BackendError if it refuses the vehicle.
     """
     if name == "own":
         if weather.needs_jsbsim:
@@ -52,13 +54,13 @@ def physics(
 
     state = initial_states(config, start.position, [start.yaw], start.ground, hovering=start.hovering)[0]
     w20 = weather.w20 if weather.turbulence_by == "jsbsim" else 0.0
-    random = np.random.default_rng([seed, system_id, _STREAM])
+    random = np.random.default_rng([seed, system_id, _RNG_STREAM_ID])
     air = Air(w20, severity(w20), int(random.integers(1, 2**31)), isa=weather.atmosphere == "isa")
     return JsbsimVehicle(config, Place(site), state, start.ground, air=air)
 
 
 def severity(w20: float) -> int:
-    """Return the curve of the severity whose wind at 20 feet is nearest to ``w20`` (m/s); 0 for none."""
+    """Return JSBSim's severity index whose wind at 20 feet is nearest to ``w20`` (m/s); 0 for no wind."""
     if w20 == 0.0:
         return 0
-    return min((abs(W20[name] - w20), curve) for name, curve in _CURVES.items())[1]
+    return min((abs(W20[name] - w20), index) for name, index in _SEVERITY_INDEX.items())[1]

@@ -1,8 +1,8 @@
 """Random processes on a fixed time grid, discretised exactly.
 
-Variance and correlation are those of the continuous process, whatever the step. Every state has variance one,
-so that the caller scales it, and time constants may change during a run without a change of strength. Such a
-step is z ← F z + G w with w white of variance one and G Gᵀ = I − F Fᵀ.
+Variance and correlation are those of the continuous process for any step. Every state has variance one; the
+caller scales it. Time constants may therefore change during a run without a change of variance. A step is
+z ← F z + G w, with white noise w of variance one and G Gᵀ = I − F Fᵀ.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 
 class OnePole(NamedTuple):
-    """One step of a first-order Gauss–Markov process: correlation e^(−|t|/τ)."""
+    """One step x ← ``keep`` x + ``gain`` w of a first-order Gauss–Markov process: correlation e^(−|t|/τ)."""
 
     keep: float
     gain: float
@@ -21,7 +21,7 @@ class OnePole(NamedTuple):
 class TwoPoles(NamedTuple):
     """One step of z = (x, ẋ/ω) with the poles −a and −b, ω² = ab; x and ẋ are uncorrelated, and ẋ exists.
 
-    The fields are the elements of F and of the lower triangle G.
+    The fields are the elements of F and of the lower triangular G.
     """
 
     f11: float
@@ -46,9 +46,9 @@ def one_pole(share: float) -> OnePole:
 
 
 def two_poles(first: float, second: float) -> TwoPoles:
-    """Return the step of a process with the poles ``first`` and ``second`` over the step.
+    """Return the step dt of a process with the poles −a, −b: ``first`` = a·dt > 0, ``second`` = b·dt > 0.
 
-    They are a·dt and b·dt, > 0; equal poles are allowed.
+    Equal poles are allowed.
     """
     apart = second - first
     decayed = math.exp(-first)

@@ -6,8 +6,8 @@
     L_w = h, L_u = L_v = h/(0.177 + 0.000823 h)^1.2               h in feet, from 10 to 1000
     σ_w = 0.1 W20, σ_u = σ_v = σ_w/(0.177 + 0.000823 h)^0.4       W20: wind at 20 feet
 
-The field is frozen and passes the vehicle with the vehicle's airspeed (Taylor), or with W20 if that is
-greater: the cause of this turbulence is a wind of W20, which also acts on a hovering vehicle.
+The field is frozen and passes the vehicle with the vehicle's airspeed (Taylor), or with W20 if it is greater:
+this turbulence is caused by a wind of W20, which also acts on a hovering vehicle.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ PERIOD: Final = 10_000
 
 _DT: Final = PERIOD * 1e-6
 _FOOT: Final = 0.3048
-_LOWEST, _HIGHEST = 10.0, 1000.0  # feet
-_BLOCK: Final = 100
+_MIN_HEIGHT_FT, _MAX_HEIGHT_FT = 10.0, 1000.0
+_SAMPLES_PER_DRAW: Final = 100
 # The numerator 1 + √3 L/V s turns a state of variance one into an output of variance 4.
-_ROOT: Final = math.sqrt(3.0)
+_SQRT_3: Final = math.sqrt(3.0)
 
 
 class Scales(NamedTuple):
@@ -46,8 +46,11 @@ class Scales(NamedTuple):
 
 
 def scales(height: float, w20: float) -> Scales:
-    """Return the scales at ``height`` (m above the ground) for ``w20`` (m/s); MIL-F-8785C 3.7.3."""
-    feet = min(max(height / _FOOT, _LOWEST), _HIGHEST)
+    """Return the scales at ``height`` (m above the ground, clipped to 10…1000 feet) for ``w20`` (m/s).
+
+    Source: MIL-F-8785C 3.7.3.
+    """
+    feet = min(max(height / _FOOT, _MIN_HEIGHT_FT), _MAX_HEIGHT_FT)
     base = 0.177 + 0.000823 * feet
     vertical = 0.1 * w20
     return Scales(feet / base**1.2 * _FOOT, feet * _FOOT, vertical / base**0.4, vertical)
@@ -56,8 +59,8 @@ def scales(height: float, w20: float) -> Scales:
 class Turbulence:
     """Gusts along the wind, across it to the right, and down: ``components`` (m/s).
 
-    They change every ``PERIOD``. The filters' states have variance one, so that the output has the variance
-    of the present place, however height and speed change on the way.
+    They change every ``PERIOD``. The filters' states have variance one, so that the output always has the
+    variance of the present height, even if height and speed have changed.
     """
 
     def __init__(self, w20: float, random: np.random.Generator) -> None:
@@ -83,7 +86,7 @@ class Turbulence:
         steep = two_poles(shift / size.vertical_length, shift / size.vertical_length)
         for _ in range(samples):
             if not self._draws:
-                self._draws = self._random.standard_normal((_BLOCK, 5)).tolist()[::-1]
+                self._draws = self._random.standard_normal((_SAMPLES_PER_DRAW, 5)).tolist()[::-1]
             a, b, c, d, e = self._draws.pop()
             self._along = keep * self._along + gain * a
             self._across = flat.step(*self._across, b, c)
@@ -94,6 +97,6 @@ class Turbulence:
         (v, dv), (w, dw) = self._across, self._down
         return (
             size.horizontal * self._along,
-            0.5 * size.horizontal * (v + _ROOT * dv),
-            0.5 * size.vertical * (w + _ROOT * dw),
+            0.5 * size.horizontal * (v + _SQRT_3 * dv),
+            0.5 * size.vertical * (w + _SQRT_3 * dw),
         )

@@ -1,7 +1,7 @@
 """Air around a vehicle: a mean wind, single gusts, turbulence.
 
-All values are the velocity of the air, in the direction of its motion. The configuration uses fleet-local
-ENU, as scenarios do; the result is NED in the site's frame, as the physics requires.
+All values are velocities of the air: they point where the wind blows to. The configuration uses fleet-local
+ENU, as scenarios do; the result is in site NED, as the physics requires.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Gust(BaseModel):
     velocity: EnuVelocity = Field(description="at its peak, in the middle, on top of the wind (m/s, ENU)")
 
     def share(self, time: float) -> float:
-        """Return the fraction of its velocity, ``time`` seconds after the goal event."""
+        """Return the fraction (0…1) of its peak velocity, ``time`` seconds after the goal event."""
         since = time - self.at_s
         if not 0.0 < since < self.length_s:
             return 0.0
@@ -84,17 +84,17 @@ class WeatherConfig(BaseModel):
 class Weather:
     """Air around one vehicle, without the turbulence of JSBSim.
 
-    ``still``: there is never any wind; ``turbulent``: the wind depends on the vehicle's place.
+    ``still``: there is never any wind; ``turbulent``: the wind depends on the vehicle's height and velocity.
     """
 
     def __init__(self, config: WeatherConfig, seed: int, system_id: int) -> None:
-        """``seed`` (≥ 0) and ``system_id`` seed the turbulence, which differs between vehicles."""
+        """Start at time 0; ``seed`` (≥ 0) and ``system_id`` seed the turbulence of this vehicle."""
         east, north, up = config.wind
         self._mean = (north, east, -up)
         self._gusts = config.gusts
         self._begun: int | None = None
         level = math.hypot(north, east)
-        # Direction along the wind; without wind, north is as good as any.
+        # Unit vector along the horizontal wind; north without wind.
         self._ahead = (north / level, east / level) if level else (1.0, 0.0)
         self._turbulence = (
             Turbulence(config.w20, np.random.default_rng([seed, system_id, _STREAM]))
@@ -105,7 +105,7 @@ class Weather:
         self.turbulent = self._turbulence is not None
 
     def begin(self, now: int) -> None:
-        """Mark the goal event at ``now`` (µs); gusts are timed from it."""
+        """Set the time of the goal event, from which gusts are timed, to ``now`` (µs)."""
         self._begun = now
 
     def wind(self, now: int, height: float = 0.0, velocity: Vector = ZERO) -> Vector:

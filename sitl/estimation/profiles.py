@@ -1,7 +1,7 @@
-"""Sensor profiles: the errors of an autopilot's estimate, as one table.
+"""Sensor profiles: tables of the errors of an autopilot's estimate.
 
-The numbers describe the *output* of the estimator, not its sensors: the values of ATTITUDE and
-LOCAL_POSITION_NED. σ is a standard deviation, τ a correlation time. Sources: the project's measured figures
+The numbers describe the *output* of the estimator (the values of ATTITUDE and LOCAL_POSITION_NED), not the
+sensors. σ is a standard deviation, τ a correlation time. Sources: the project's measured figures
 for an EKF-like output (position σ 0.3–0.5 m with τ 30–60 s and 0.02 m white, velocity 0.05–0.1 m/s, roll and
 pitch 0.5°, yaw 1–2°, rates 0.01–0.02 rad/s); RTK σ 0.02 m by definition of the profile; the rest as the
 descriptions say.
@@ -61,7 +61,7 @@ class SensorProfile(BaseModel):
 
     @property
     def exact(self) -> bool:
-        """Whether the motion is estimated without error or delay."""
+        """Whether the motion is estimated without error or delay; gaps in messages do not count."""
         errors = (
             self.horizontal_drift,
             self.vertical_drift,

@@ -1,8 +1,8 @@
 """Random errors of an estimate, per sample of the estimator's clock of 100 Hz.
 
-The position wanders as a two-pole Gauss–Markov process, so that the wandering has a speed, and the velocity
-error contains that speed unless the profile excludes it: the two are then consistent. Reading the errors does
-not advance them.
+The slow error of the position is a two-pole Gauss–Markov process, which has a rate of change. The velocity
+error contains this rate, consistent with the position error, unless the profile excludes it. Reading the
+errors does not advance them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ PERIOD: Final = 10_000
 """Time between samples (µs): both filters run at 100 Hz."""
 
 _DT: Final = PERIOD * 1e-6
-_BLOCK: Final = 100
+_BLOCK_SAMPLES: Final = 100
 _ONE_POLES: Final = 9  # velocity, roll, pitch, yaw, gyro bias
 _DRAWS: Final = 6 + _ONE_POLES + 6  # two poles per axis; one poles; white position and rates
 
@@ -32,7 +32,8 @@ class Errors(NamedTuple):
     """Estimate minus truth.
 
     Position (m) and velocity (m/s) in local NED, roll, pitch and yaw (rad), body rates (rad/s, FRD).
-    ``drift``: speed (m/s) of the position's wandering that the velocity does not contain.
+    ``drift``: rate of change (m/s, local NED) of the slow position error, where the velocity error does not
+    contain it; else zero.
     """
 
     position: Vector
@@ -51,11 +52,11 @@ class RandomErrors:
         """Start in the steady state at the first sample."""
         p = profile
         poles = two_poles(_DT / p.drift_time, _DT / p.drift_onset)
-        self._turn = np.array([[poles.f11, poles.f12], [poles.f21, poles.f22]])
-        self._kick = np.array([[poles.g11, 0.0], [poles.g21, poles.g22]])
+        self._transition = np.array([[poles.f11, poles.f12], [poles.f21, poles.f22]])
+        self._noise_gain = np.array([[poles.g11, 0.0], [poles.g21, poles.g22]])
         times = [p.velocity_time] * 3 + [p.tilt_time] * 2 + [p.yaw_time] + [p.rate_bias_time] * 3
         steps = [one_pole(_DT / time) for time in times]
-        self._keep = np.array([step.keep for step in steps])
+        self._decay = np.array([step.keep for step in steps])
         self._gain = np.array([step.gain for step in steps])
         drift = np.array([p.horizontal_drift, p.horizontal_drift, p.vertical_drift])
         self._drift = drift
@@ -73,8 +74,8 @@ class RandomErrors:
 
     def advance(self, sample: int) -> None:
         """Advance to ``sample``; going back is not possible."""
-        while sample - self._first >= _BLOCK:
-            self._first += _BLOCK
+        while sample - self._first >= _BLOCK_SAMPLES:
+            self._first += _BLOCK_SAMPLES
             self._rows = self._block()
         self._sample = sample - self._first
 
@@ -86,14 +87,14 @@ class RandomErrors:
 
     def _block(self) -> Array:
         """Return the next rows (_BLOCK, 15) of errors."""
-        draws = self._random.standard_normal((_BLOCK, _DRAWS))
-        kicks = self._kick @ draws[:, :6].reshape(_BLOCK, 2, 3)
-        nudges = self._gain * draws[:, 6 : 6 + _ONE_POLES]
-        walks, biases = np.empty((_BLOCK, 2, 3)), np.empty((_BLOCK, _ONE_POLES))
-        for k in range(_BLOCK):
+        draws = self._random.standard_normal((_BLOCK_SAMPLES, _DRAWS))
+        pole_noise = self._noise_gain @ draws[:, :6].reshape(_BLOCK_SAMPLES, 2, 3)
+        bias_noise = self._gain * draws[:, 6 : 6 + _ONE_POLES]
+        walks, biases = np.empty((_BLOCK_SAMPLES, 2, 3)), np.empty((_BLOCK_SAMPLES, _ONE_POLES))
+        for k in range(_BLOCK_SAMPLES):
             walks[k], biases[k] = self._walks, self._biases
-            self._walks = self._turn @ self._walks + kicks[k]
-            self._biases = self._keep * self._biases + nudges[k]
+            self._walks = self._transition @ self._walks + pole_noise[k]
+            self._biases = self._decay * self._biases + bias_noise[k]
         biases *= self._sizes
         white = self._white * draws[:, -6:]
         return np.hstack(

@@ -23,8 +23,9 @@ from sitl.values.setpoints import ZERO, Pose
 from sitl.vehicle.airframe import FloatArray
 from sitl.vehicle.multirotor import VehicleState
 
-_STREAM: Final = 0x53
-_FLAWLESS: Final = Errors(ZERO, ZERO, 0.0, 0.0, 0.0, ZERO)
+# Separates these random numbers from those of the vehicle's weather and physics, which have the same seeds.
+_RNG_STREAM_ID: Final = 0x53
+_NO_ERRORS: Final = Errors(ZERO, ZERO, 0.0, 0.0, 0.0, ZERO)
 
 
 class Estimate(NamedTuple):
@@ -61,7 +62,7 @@ class Deviation(NamedTuple):
 class Sensors:
     """Estimator of one vehicle.
 
-    ``gps`` is its positioning; ``exact``: the estimate is the truth, and ``advance`` need not be called.
+    ``gps``: errors by GPS faults; ``exact``: the estimate is the truth, and ``advance`` need not be called.
     """
 
     def __init__(
@@ -69,22 +70,24 @@ class Sensors:
         profile: SensorProfile,
         origin: Origin,
         state: VehicleState,
-        patience: float,
+        position_timeout: float,
         seed: int,
         system_id: int,
     ) -> None:
         """Start with the true ``state`` at time 0.
 
-        ``patience`` (s): how long the filter coasts without GPS. ``seed`` (≥ 0) and ``system_id`` seed the
-        errors.
+        ``position_timeout`` (s): time without GPS after which the position is lost. ``seed`` (≥ 0) and
+        ``system_id`` seed the errors.
         """
-        random, gaps, losses = (np.random.default_rng([seed, system_id, _STREAM, part]) for part in range(3))
+        random, gaps, losses = (
+            np.random.default_rng([seed, system_id, _RNG_STREAM_ID, part]) for part in range(3)
+        )
         self._origin = origin
         self._delay = profile.delay
-        self._flawless = profile.exact
+        self._no_random_errors = profile.exact
         self._random_errors = None if profile.exact else RandomErrors(profile, random)
         self._gaps = _Gaps(profile, gaps)
-        self.gps = Positioning(patience, PERIOD * 1e-6, losses)
+        self.gps = Positioning(position_timeout, PERIOD * 1e-6, losses)
         self._sample = 0
         self._time = 0
         self._past = deque([(0, state)])
@@ -92,11 +95,11 @@ class Sensors:
     @property
     def exact(self) -> bool:
         """Whether the estimate is the truth."""
-        return self._flawless and self.gps.nominal
+        return self._no_random_errors and self.gps.nominal
 
     @property
     def drift(self) -> Vector:
-        """Velocity (m/s, local NED) of the position's wandering that is not in the estimated velocity."""
+        """Rate of change (m/s, local NED) of the position error where the estimated velocity lacks it."""
         return self._errors.drift
 
     def silent(self, now: int) -> bool:
@@ -124,8 +127,8 @@ class Sensors:
     def estimate(self, state: VehicleState) -> Estimate:
         """Return the present estimate; ``state`` is the truth."""
         if self.exact:
-            return _seen(self._origin, state)
-        seen, errors, gps = _seen(self._origin, self._delayed), self._errors, self.gps
+            return _in_local_frame(self._origin, state)
+        seen, errors, gps = _in_local_frame(self._origin, self._delayed), self._errors, self.gps
         return Estimate(
             _sum(seen.position, errors.position, gps.position),
             _sum(seen.velocity, errors.velocity, gps.velocity),
@@ -158,26 +161,26 @@ class Sensors:
 
     def lose_gps(self, time: int, state: VehicleState) -> None:
         """Stop GPS; ``state`` is the truth at ``time`` (µs), that of the last move."""
-        self._wake(time, state)
+        self._start_history(time, state)
         self.gps.lose()
 
     def shift_gps(self, offset: Vector, time: int, state: VehicleState) -> None:
-        """Set the total GPS error to ``offset`` (m, local NED); other arguments as for ``lose_gps``."""
-        self._wake(time, state)
+        """Set the error of GPS positions to ``offset`` (m, local NED); the rest as for ``lose_gps``."""
+        self._start_history(time, state)
         self.gps.shift(offset)
 
-    def _wake(self, time: int, state: VehicleState) -> None:
+    def _start_history(self, time: int, state: VehicleState) -> None:
         if self.exact:
             self._past = deque([(time, state)])
             self._sample, self._time = time // PERIOD, time
 
     @property
     def _errors(self) -> Errors:
-        return _FLAWLESS if self._random_errors is None else self._random_errors.errors
+        return _NO_ERRORS if self._random_errors is None else self._random_errors.errors
 
     @property
     def _delayed(self) -> VehicleState:
-        """State of ``delay`` ago, interpolated linearly between the recorded states."""
+        """True state ``delay`` ago, interpolated linearly; before the first recorded state, that state."""
         time = self._time - self._delay
         before, a = self._past[0]
         if before >= time or len(self._past) == 1:
@@ -211,8 +214,8 @@ class _Gaps:
         self._end = self._begin + self._random.uniform(*self._lengths)
 
 
-def _seen(origin: Origin, state: VehicleState) -> Estimate:
-    """Return a true state in the own local frame.
+def _in_local_frame(origin: Origin, state: VehicleState) -> Estimate:
+    """Return a true state in the vehicle's own local frame.
 
     The tilt between site and local plane (0.16 mrad per km) is neglected in roll and pitch.
     """

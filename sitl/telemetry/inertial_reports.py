@@ -9,11 +9,11 @@ from mavlink_bridge.messages import HighresImu, Message, RawImu, SimState, Vecto
 from sitl.telemetry.reports import Snapshot
 from sitl.values.attitudes import euler, quaternion, to_body
 
-# gauss, NED, as in Zurich.
+# Magnetic field, gauss, NED, as in Zurich.
 _EARTH_FIELD: Final = (0.2155, 0.0120, 0.4240)
-_SEA_LEVEL: Final = 1013.25
-_SCALE_HEIGHT: Final = 8434.0
-_WARM: Final = 25.0
+_SEA_LEVEL_HPA: Final = 1013.25
+_SCALE_HEIGHT_M: Final = 8434.0
+_TEMPERATURE_C: Final = 25.0
 
 
 def raw_imu(s: Snapshot) -> Message:
@@ -24,9 +24,9 @@ def raw_imu(s: Snapshot) -> Message:
 def highres_imu(s: Snapshot) -> Message:
     """Return HIGHRES_IMU (105)."""
     altitude = s.origin.altitude - s.estimate.position[2]
-    pressure = _SEA_LEVEL * math.exp(-altitude / _SCALE_HEIGHT)
+    pressure = _SEA_LEVEL_HPA * math.exp(-altitude / _SCALE_HEIGHT_M)
     return HighresImu(
-        s.source, s.time, _force(s), s.estimate.body_rates, _field(s), pressure, altitude, _WARM
+        s.source, s.time, _force(s), s.estimate.body_rates, _field(s), pressure, altitude, _TEMPERATURE_C
     )
 
 
@@ -36,18 +36,19 @@ def sim_state(s: Snapshot) -> Message:
     w, x, y, z = truth.attitude.tolist()
     latitude, longitude, _ = s.origin.geodetic(s.origin.position_to_local(truth.position))
     p, q, r = truth.body_rates.tolist()
-    # The site's axes are rotated against the local ones by some millionths.
+    # Attitude relative to site NED: its rotation against local NED, 0.16 mrad per km, is neglected.
     return SimState(s.source, *euler((w, x, y, z)), _force(s), (p, q, r), latitude, longitude)
 
 
 def _force(s: Snapshot) -> Vector:
-    """Return the specific force of the rotors (m/s², FRD), which acts along the body's z axis.
+    """Return the specific force (m/s², FRD) of the rotors or of the ground, along the body's z axis.
 
-    Drag, a tenth of it at most, is left out.
+    Drag, at most a tenth of it, is neglected.
     """
     return 0.0, 0.0, -s.lift()
 
 
 def _field(s: Snapshot) -> Vector:
+    """Return the magnetic field (gauss, FRD)."""
     e = s.estimate
     return to_body(quaternion(e.roll, e.pitch, e.yaw), _EARTH_FIELD)

@@ -40,7 +40,7 @@ TYPES: Final = {
 }
 """MAV_TYPE by the number of rotors; others are generic."""
 
-# Healthy from the start; GPS and the pre-arm check wait for a position.
+# Healthy from the start, unlike GPS and the pre-arm check.
 _SENSORS: Final = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
     | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
@@ -66,25 +66,26 @@ _EKF_READY: Final[int] = (
     | mavlink.EKF_PRED_POS_HORIZ_ABS
 )
 _EKF_WAITING: Final[int] = mavlink.EKF_ATTITUDE | mavlink.EKF_CONST_POS_MODE
-# The flags that a third, and two thirds, of the start-up add.
+# Added after one third, and after two thirds, of the start-up.
 _EKF_VERTICAL: Final[int] = mavlink.EKF_VELOCITY_VERT | mavlink.EKF_POS_VERT_ABS
 _EKF_HORIZONTAL: Final[int] = mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_POS_HORIZ_REL
-# Without GPS for too long: height by barometer.
+# Without GPS for too long: attitude, and height by barometer.
 _EKF_LOST: Final[int] = mavlink.EKF_ATTITUDE | _EKF_VERTICAL | mavlink.EKF_CONST_POS_MODE
-# Innovation over gate of a healthy filter.
-_TESTED: Final = 0.05
+# Innovation test ratio (innovation over gate) of a healthy filter.
+_HEALTHY_RATIO: Final = 0.05
 
 
 class Snapshot(NamedTuple):
     """Inputs of all telemetry messages.
 
     ``time`` since boot (µs); ``base_mode`` with the armed bit; ``target`` returns the set-point that is
-    followed now, or None. ``located``: the estimator has a position or waits for its first; ``fixed``: there
-    is GPS; ``strain``, ``spread``: those of ``Positioning``; ``silent``: position messages drop out.
-    ``waking`` 0…1: start-up progress of GPS and filter, if that is shown; ``charge`` None without a battery;
+    followed now, or None. ``located``: the estimator has not lost its position (true before the first one);
+    ``fixed``: there is GPS; ``test_ratio``: innovation test ratio of the position; ``spread``: σ (m) of the
+    position added since the loss of GPS; ``silent``: position messages drop out. ``waking`` 0…1: progress of
+    the reported start-up of GPS and filter; ``charge`` None without a battery;
     ``throttle`` 0…1; ``unbreached``: MAV_SYS_STATUS_GEOFENCE where it is reported; ``epoch``: Unix time of
     the boot (µs), 0 if unknown; ``version``: AUTOPILOT_VERSION; ``mission`` returns MISSION_CURRENT,
-    ``fence`` FENCE_STATUS. ``armable``: there is no objection to arming, or it is armed. ``lift``: specific
+    ``fence`` FENCE_STATUS. ``armable``: ready, and armed or without objection to arming. ``lift``: specific
     force of the rotors, or of the ground (m/s²); ``truth``: the true state, site NED.
     """
 
@@ -103,7 +104,7 @@ class Snapshot(NamedTuple):
     echoes_yaw: bool
     located: bool
     fixed: bool
-    strain: float
+    test_ratio: float
     spread: float
     silent: bool
     waking: float
@@ -149,14 +150,14 @@ def attitude(s: Snapshot) -> Message:
 
 
 def local_position(s: Snapshot) -> Message | None:
-    """Return LOCAL_POSITION_NED (32), or None without a position or in a drop-out."""
+    """Return LOCAL_POSITION_NED (32), or None if not ready or in a drop-out."""
     if not s.ready or s.silent:
         return None
     return LocalPosition(s.source, s.time, s.estimate.position, s.estimate.velocity)
 
 
 def global_position(s: Snapshot) -> Message | None:
-    """Return GLOBAL_POSITION_INT (33), or None without a position or in a drop-out."""
+    """Return GLOBAL_POSITION_INT (33), or None if not ready or in a drop-out."""
     if not s.ready or s.silent:
         return None
     e, origin = s.estimate, s.origin
@@ -195,17 +196,19 @@ def position_target(s: Snapshot) -> Message | None:
 
 def ekf_status(s: Snapshot) -> Message:
     """Return EKF_STATUS_REPORT (193)."""
-    good = _TESTED if s.located else 0.0
-    # The same bit means a GPS glitch in ESTIMATOR_STATUS.
+    good = _HEALTHY_RATIO if s.located else 0.0
+    # Not in ``estimator_flags``, because in ESTIMATOR_STATUS this bit means a GPS glitch.
     waits = 0 if s.ready or not s.located else mavlink.EKF_UNINITIALIZED
-    return EkfStatus(s.source, estimator_flags(s) | waits, good, max(good, s.strain), _TESTED, _TESTED)
+    return EkfStatus(
+        s.source, estimator_flags(s) | waits, good, max(good, s.test_ratio), _HEALTHY_RATIO, _HEALTHY_RATIO
+    )
 
 
 def estimator_flags(s: Snapshot) -> int:
     """Return the flags that EKF_STATUS_FLAGS and ESTIMATOR_STATUS_FLAGS have in common.
 
-    While ``waking``: attitude at once, vertical velocity and height from a third, horizontal velocity and
-    relative position from two thirds.
+    During start-up: attitude at once, vertical velocity and height from one third of ``waking`` on,
+    horizontal velocity and relative position from two thirds on.
     """
     if s.ready or not s.located:
         return _EKF_READY if s.ready else _EKF_LOST
@@ -221,4 +224,4 @@ def extended_sys_state(s: Snapshot) -> Message:
 
 
 Build = Callable[[Snapshot], Message | None]
-"""Builds one message, or returns None if it has no content yet."""
+"""Builder of one message; returns None if there is nothing to send."""

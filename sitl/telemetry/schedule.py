@@ -17,7 +17,7 @@ _NEVER: Final = 1 << 62
 
 
 class _Stream:
-    """One message and its due time (µs); ``usual`` is the configured interval, 0 for none."""
+    """One message and its due time; ``interval`` and the configured one, ``usual``, in µs, 0 for none."""
 
     __slots__ = ("build", "due", "interval", "usual")
 
@@ -29,7 +29,7 @@ class _Stream:
 
 
 class Telemetry:
-    """Streams of one autopilot. ``next_due`` (µs): nothing is due before it."""
+    """Telemetry streams of one autopilot. ``next_due`` (µs): earliest due time."""
 
     def __init__(self, rates: TelemetryRates, reports_ekf: bool) -> None:
         """``reports_ekf`` selects the streams of ArduPilot, else those of PX4.
@@ -74,8 +74,8 @@ class Telemetry:
             self._streams[mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS] = _Stream(
                 q.estimator_status, rates.estimator_status
             )
-        # Active streams; most are inactive, and a step should not have to check them.
-        self._flowing: list[_Stream] = []
+        # Active streams only: most are inactive, and a step need not check those.
+        self._active: list[_Stream] = []
         self._requested: list[int] = []
         self.next_due = _NEVER
 
@@ -86,7 +86,7 @@ class Telemetry:
         self._gather()
 
     def set_interval(self, message_id: int, interval: int, now: int) -> bool:
-        """Execute SET_MESSAGE_INTERVAL (511): µs, 0 for the default interval, −1 for none.
+        """Execute SET_MESSAGE_INTERVAL (511): ``interval`` in µs, 0 for the configured one, −1 for none.
 
         Return False if there is no such message.
         """
@@ -101,10 +101,7 @@ class Telemetry:
         return True
 
     def interval(self, message_id: int) -> int:
-        """Return the interval as in MESSAGE_INTERVAL (244).
-
-        It is in µs, −1 if the stream is inactive, 0 if there is no such message.
-        """
+        """Return the interval as in MESSAGE_INTERVAL (244): µs, −1 for none, 0 for an unknown message."""
         stream = self._streams.get(message_id)
         return 0 if stream is None else stream.interval or -1
 
@@ -125,7 +122,7 @@ class Telemetry:
         """Return all messages due at ``now`` (µs). A late stream skips the messages that it missed."""
         builds = [self._streams[message_id].build for message_id in self._requested]
         self._requested.clear()
-        for stream in self._flowing:
+        for stream in self._active:
             if stream.due <= now:
                 builds.append(stream.build)
                 stream.due += stream.interval
@@ -135,9 +132,9 @@ class Telemetry:
         return [message for build in builds if (message := build(snapshot)) is not None]
 
     def _gather(self) -> None:
-        self._flowing = [stream for stream in self._streams.values() if stream.interval]
+        self._active = [stream for stream in self._streams.values() if stream.interval]
         self._schedule()
 
     def _schedule(self) -> None:
-        dues = (stream.due for stream in self._flowing)
+        dues = (stream.due for stream in self._active)
         self.next_due = 0 if self._requested else min(dues, default=_NEVER)

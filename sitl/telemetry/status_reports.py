@@ -23,9 +23,10 @@ from sitl.telemetry.reports import Snapshot, estimator_flags
 from sitl.values.attitudes import quaternion
 
 _SATELLITES: Final = 12
+# Shares of the charge below which the battery is reported as low or critical.
 _LOW_AT, _CRITICAL_AT = 0.15, 0.07
-# Limit of the speed field of GPS_RAW_INT (m/s).
-_FASTEST: Final = 655.0
+# Limit of the speed field of GPS_RAW_INT.
+_MAX_SPEED_M_S: Final = 655.0
 _NAN: Final = math.nan
 # Capabilities of both firmwares. Files, terrain and compass calibration are not supported.
 _CAPABILITIES: Final = (
@@ -67,7 +68,7 @@ def gps_raw(s: Snapshot) -> Message:
     e = s.estimate
     latitude, longitude, altitude = s.origin.geodetic(e.position)
     north, east, _ = e.velocity
-    speed = min(math.hypot(north, east), _FASTEST)
+    speed = min(math.hypot(north, east), _MAX_SPEED_M_S)
     course = math.atan2(east, north) if speed > 0.1 else None
     place = latitude, longitude, altitude
     return GpsRaw(s.source, s.time, fix, *place, 0.7, 1.1, speed, course, satellites, altitude, 0.3, 0.4, 0.1)
@@ -94,7 +95,7 @@ def vfr_hud(s: Snapshot) -> Message:
 
 
 def altitude(s: Snapshot) -> Message | None:
-    """Return ALTITUDE (141), or None before the first position."""
+    """Return ALTITUDE (141), or None if not ready."""
     if not s.ready:
         return None
     height = -s.estimate.position[2]
@@ -125,8 +126,8 @@ def autopilot_version(s: Snapshot) -> Message:
 def version(source: Source, flavour: str) -> AutopilotVersion:
     """Return AUTOPILOT_VERSION (148) of ``flavour``.
 
-    The version is the one recorded of the emulated firmware. The uid contains the system id, so that each
-    vehicle has its own; the eight bytes of the version control hash are our name.
+    The version is that of the emulated firmware. The uid contains the system id, so that it is unique; the
+    eight bytes of ``flight_custom``, usually a version control hash, are "outrider".
     """
     capabilities = _CAPABILITIES
     if flavour == "px4":
@@ -146,7 +147,7 @@ def estimator_status(s: Snapshot) -> Message:
     """Return ESTIMATOR_STATUS (230)."""
     good = 0.05 if s.located else _NAN
     # The ratios of this message are squares.
-    ratios = good, max(good, s.strain**2), 0.05, 0.05, _NAN, _NAN
+    ratios = good, max(good, s.test_ratio**2), 0.05, 0.05, _NAN, _NAN
     return EstimatorStatus(s.source, s.time, *ratios, 0.3 + s.spread, 0.3, estimator_flags(s))
 
 

@@ -1,4 +1,4 @@
-"""Texts of the autopilot for people: STATUSTEXT (253)."""
+"""Status texts of the autopilot: STATUSTEXT (253)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from mavlink_bridge.messages import Message, Source, StatusText
 
 _SECOND: Final = 1_000_000
-# Limit of complaints per second, against senders that make thousands of mistakes.
-_MOST: Final = 32
+# Limits the answers to a sender of thousands of faulty messages.
+_MAX_WARNINGS_PER_S: Final = 32
 
 
 class StatusReporter:
@@ -22,11 +22,11 @@ class StatusReporter:
         self._complaints: dict[str, int] = {}
 
     def inform(self, text: str) -> None:
-        """Report normal events."""
+        """Send ``text`` as information about a normal event."""
         self._outbox.append(StatusText(self._source, mavlink.MAV_SEVERITY_INFO, text))
 
     def warn(self, text: str) -> None:
-        """Report a refusal or a failure."""
+        """Send ``text`` as a warning about a refusal or a failure."""
         self._outbox.append(StatusText(self._source, mavlink.MAV_SEVERITY_WARNING, text))
 
     def complain(self, text: str, now: int) -> None:
@@ -34,10 +34,10 @@ class StatusReporter:
         complaints = self._complaints
         if now - complaints.get(text, -_SECOND) < _SECOND:
             return
-        if len(complaints) >= _MOST:
+        if len(complaints) >= _MAX_WARNINGS_PER_S:
             for said in [said for said, then in complaints.items() if now - then >= _SECOND]:
                 del complaints[said]
-            if len(complaints) >= _MOST:
+            if len(complaints) >= _MAX_WARNINGS_PER_S:
                 return
         complaints[text] = now
         self.warn(text)

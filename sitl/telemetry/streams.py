@@ -8,7 +8,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from sitl.config.autopilot import AutopilotConfig, TelemetryRates
 
-# A real ArduCopter sends only HEARTBEAT until requested, usually at 4 Hz; but not every script requests.
+# A real ArduCopter sends only HEARTBEAT and STATUSTEXT before a request, which usually asks for 4 Hz. Some
+# scripts request nothing, so the streams run from the start here.
 _ARDUPILOT: Final = TelemetryRates(
     sys_status=2.0,
     attitude=4.0,
@@ -26,7 +27,7 @@ _ARDUPILOT: Final = TelemetryRates(
     battery_status=1.0,
     home_position=0.5,
 )
-# As recorded of PX4 1.16, with the fast streams slower: a client that needs 50 Hz requests them anyway.
+# As recorded from PX4 1.16, but with lower rates of the fast streams: a client that needs 50 Hz requests it.
 _PX4: Final = TelemetryRates(
     sys_status=5.0,
     attitude=20.0,
@@ -69,7 +70,7 @@ GROUPS: Final[dict[int, tuple[int, ...]]] = {
 
 
 def usual_rates(config: AutopilotConfig) -> TelemetryRates:
-    """Return the rates of messages from the start."""
+    """Return the rates of messages before any request."""
     if config.streams == "quiet":
         return config.rates
     return _ARDUPILOT if config.flavour == "ardupilot" else _PX4

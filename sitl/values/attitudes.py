@@ -31,7 +31,7 @@ def euler(attitude: Quaternion) -> Vector:
 
 
 def to_body(attitude: Quaternion, vector: Vector) -> Vector:
-    """Return a vector in NED in body axes (FRD)."""
+    """Rotate ``vector`` from NED to body axes (FRD)."""
     w, *axis = attitude
     x, y, z = axis
     a, b, c = vector

@@ -10,11 +10,11 @@ from mavlink_bridge.messages import HomePosition, Source, Vector
 from sitl.values.origin import Origin
 
 ABOVE_SEA: Final = frozenset((mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT))
-"""Frames whose altitude counts from mean sea level."""
+"""Frames whose altitude is above mean sea level."""
 ABOVE_HOME: Final = frozenset(
     (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 )
-"""Frames whose altitude counts from home."""
+"""Frames whose altitude is above home."""
 NOWHERE: Final = 0x7FFFFFFF
 """INT32_MAX as latitude or longitude: the vehicle's position, or "unchanged"."""
 _NAN = float("nan")
@@ -23,8 +23,8 @@ _NAN = float("nan")
 class Home:
     """Home position.
 
-    ``position`` (m, own local NED) and ``latitude``, ``longitude`` (degrees), ``altitude`` (m above mean sea
-    level). Home is at first the origin; the origin stays when home is moved.
+    ``position`` (m, own local NED), ``latitude``, ``longitude`` (degrees), ``altitude`` (m above mean sea
+    level). Home is initially at the origin; moving home does not move the origin.
     """
 
     def __init__(self, origin: Origin) -> None:
@@ -34,7 +34,7 @@ class Home:
 
     @property
     def height(self) -> float:
-        """Height above the origin (m)."""
+        """Height of home above the origin (m)."""
         return self.altitude - self._origin.altitude
 
     def move(self, latitude: float, longitude: float, altitude: float) -> None:

@@ -1,6 +1,7 @@
-"""Position of a vehicle's own local frame in the site, the NED frame in which all vehicles move.
+"""Pose of a vehicle's own local frame in the site frame, the NED frame in which all vehicles move.
 
-site NED = NED of the site's ``FleetFrame``; local NED = NED at the vehicle's own GPS_GLOBAL_ORIGIN.
+site NED: the axes of the site's ``FleetFrame`` (ENU) in the order north, east, down, with the same origin;
+local NED: NED at the vehicle's own GPS_GLOBAL_ORIGIN.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ Array = npt.NDArray[np.float64]
 
 
 class Origin:
-    """Origin at whole degE7 and mm, so that the transmitted GPS_GLOBAL_ORIGIN (49) is exact.
+    """Origin rounded to whole degE7 and mm, so that the transmitted GPS_GLOBAL_ORIGIN (49) is exact.
 
-    p_site = R p_local + t: ``rotation`` R (3, 3), ``position`` t (3,) m, site NED; ``turn`` (rad) is the yaw
-    in the site of the local north; ``site`` the site itself.
+    p_site = R p_local + t: ``rotation`` R (3, 3), ``position`` t (3,) m, site NED. ``turn`` (rad): yaw of the
+    local north in site NED. ``site``: frame of the site (ENU).
     """
 
     def __init__(self, site: FleetFrame, latitude: float, longitude: float, altitude: float) -> None:
@@ -27,7 +28,7 @@ class Origin:
         self.altitude = round(altitude * 1e3) / 1e3
         self.site = site
         frame = site.local(self.latitude, self.longitude, self.altitude)
-        # Row i of ``axes`` is the local axis i in the site: the transpose of R, as rows of vectors need it.
+        # Row i of ``axes`` is the local axis i in site NED. ``axes`` = Rᵀ transforms row vectors: v @ axes.
         axes = enu_to_ned(frame.velocity_to_fleet(np.eye(3)))
         axes.flags.writeable = False
         self._axes = axes
@@ -37,7 +38,7 @@ class Origin:
         self.turn = yaw_to_ned(frame.yaw_to_fleet(0.0))
 
     def motion_to_site(self, motion: npt.ArrayLike) -> Array:
-        """Transform rows (n ≥ 1, 3) of a position, then free vectors: local NED → site NED."""
+        """Transform rows (n ≥ 1, 3), local NED → site NED: row 0 is a position (m), others free vectors."""
         moved: Array = np.array(motion).dot(self._axes)
         moved[0] += self.position
         return moved

@@ -38,16 +38,16 @@ ACCELERATION: Final = 2
 
 ZERO: Final[Vector] = (0.0, 0.0, 0.0)
 
-# A number at a limit may return slightly above it from float32.
+# The conversion to float32 may raise a number at a limit slightly above it.
 _ROUNDING: Final = 1.0 + 1e-6
-# Beyond any flight: larger numbers are corrupt, and would overflow the float32 of the echo.
-_FAR, _FAST, _TURNING = 1e5, 1e3, 1e2
+# No flight exceeds these; larger numbers are corrupt, and could overflow the float32 fields of the echo.
+_MAX_POSITION, _MAX_VALUE, _MAX_YAW_RATE = 1e5, 1e3, 1e2
 _RANGES: Final = (
-    ("position", _FAR),
-    ("velocity", _FAST),
-    ("acceleration", _FAST),
-    ("yaw", _FAST),
-    ("yaw rate", _TURNING),
+    ("position", _MAX_POSITION),
+    ("velocity", _MAX_VALUE),
+    ("acceleration", _MAX_VALUE),
+    ("yaw", _MAX_VALUE),
+    ("yaw rate", _MAX_YAW_RATE),
 )
 
 
@@ -77,7 +77,7 @@ class Setpoint(NamedTuple):
 
     @property
     def moves(self) -> bool:
-        """Whether it requests motion that must not continue for ever without further set-points."""
+        """Whether it requests motion that must end if no further set-point arrives."""
         return (
             self.levels != (POSITION, POSITION, POSITION)
             or self.velocity != ZERO
@@ -85,7 +85,10 @@ class Setpoint(NamedTuple):
         )
 
     def limited(self, speed: float, acceleration: float) -> Setpoint:
-        """Return it with feed-forward within the limits (m/s, m/s²); not ``complete`` if that changed it."""
+        """Return it with the norms of velocity and acceleration limited (m/s, m/s²).
+
+        A changed set-point is not ``complete``.
+        """
         fast = math.hypot(*self.velocity)
         strong = math.hypot(*self.acceleration)
         if fast <= speed * _ROUNDING and strong <= acceleration * _ROUNDING:
@@ -99,7 +102,7 @@ class Setpoint(NamedTuple):
     def after(self, age: float, thrusting: float) -> Setpoint:
         """Return it extrapolated by ``age`` seconds.
 
-        The acceleration acts for the first ``thrusting`` of them, then the velocity is kept
+        The acceleration acts for the first ``thrusting`` seconds; then the velocity is constant
         (constant-acceleration kinematics, per axis).
         """
         burn = age if age < thrusting else thrusting
@@ -172,17 +175,17 @@ def _usable(message: SetpointLocal) -> bool:
     """Return whether all fields, used or not, are valid: the usual case, checked quickly."""
     (x, y, z), (u, v, w), (a, b, c) = message.position, message.velocity, message.acceleration
     return (
-        -_FAR <= x <= _FAR
-        and -_FAR <= y <= _FAR
-        and -_FAR <= z <= _FAR
-        and -_FAST <= u <= _FAST
-        and -_FAST <= v <= _FAST
-        and -_FAST <= w <= _FAST
-        and -_FAST <= a <= _FAST
-        and -_FAST <= b <= _FAST
-        and -_FAST <= c <= _FAST
-        and -_FAST <= message.yaw <= _FAST
-        and -_TURNING <= message.yaw_rate <= _TURNING
+        -_MAX_POSITION <= x <= _MAX_POSITION
+        and -_MAX_POSITION <= y <= _MAX_POSITION
+        and -_MAX_POSITION <= z <= _MAX_POSITION
+        and -_MAX_VALUE <= u <= _MAX_VALUE
+        and -_MAX_VALUE <= v <= _MAX_VALUE
+        and -_MAX_VALUE <= w <= _MAX_VALUE
+        and -_MAX_VALUE <= a <= _MAX_VALUE
+        and -_MAX_VALUE <= b <= _MAX_VALUE
+        and -_MAX_VALUE <= c <= _MAX_VALUE
+        and -_MAX_VALUE <= message.yaw <= _MAX_VALUE
+        and -_MAX_YAW_RATE <= message.yaw_rate <= _MAX_YAW_RATE
     )
 
 

@@ -26,9 +26,9 @@ def effectiveness(rotor_x: FloatArray, rotor_y: FloatArray, rotor_spin: FloatArr
 
 @kernel
 def _collective_range(rotor_thrusts: FloatArray, airframe: Airframe) -> tuple[float, float]:
-    """Return the limits of the total thrust (N) that can be added to the given thrusts.
+    """Return the range of total thrust (N) that, added to the given thrusts, keeps each rotor in its limits.
 
-    Within them every rotor stays within its own limits.
+    The range is empty (lower limit above upper limit) if there is no such thrust.
     """
     low, high = -math.inf, math.inf
     for i in range(airframe.rotor_x.size):
@@ -40,7 +40,7 @@ def _collective_range(rotor_thrusts: FloatArray, airframe: Airframe) -> tuple[fl
 
 @kernel
 def _feasible_tilting(tilting: FloatArray, airframe: Airframe) -> float:
-    """Return the largest part (0…1) of roll and pitch that leaves some total thrust within all limits."""
+    """Return the largest part (0…1) of the thrusts ``tilting`` (n,) (N) with a total thrust in all limits."""
     part = 1.0
     for i in range(airframe.rotor_x.size):
         for j in range(airframe.rotor_x.size):
@@ -79,9 +79,9 @@ def allocate(thrust: float, moment: Vector, airframe: Airframe, commanded: Float
     for i in range(n):
         put(commanded, i, airframe.mixer[i, 1] * moment[0] + airframe.mixer[i, 2] * moment[1])
     low, high = _collective_range(commanded, airframe)
-    torn = low > high
-    if some(torn):
-        part = where(torn, _feasible_tilting(commanded, airframe), 1.0)
+    infeasible = low > high
+    if some(infeasible):
+        part = where(infeasible, _feasible_tilting(commanded, airframe), 1.0)
         for i in range(n):
             put(commanded, i, part * at(commanded, i))
         low, high = _collective_range(commanded, airframe)

@@ -12,7 +12,7 @@ from sitl.vehicle.compiled import entry, kernel, sources_digest
 from sitl.vehicle.pipeline import COMMAND_SIZE, advance
 from sitl.vehicle.simd import LANES
 
-_WORTH_A_BLOCK = 3
+_MIN_BLOCK_VEHICLES = 3
 """Number of vehicles from which on a block is faster than single rows, although its other lanes are idle."""
 
 
@@ -124,7 +124,7 @@ def advance_rows(
     """
     count = len(states)
     rest = count % LANES
-    blocks = count if rest >= _WORTH_A_BLOCK else count - rest
+    blocks = count if rest >= _MIN_BLOCK_VEHICLES else count - rest
     if blocks:
         bad = _in_blocks(states, commands, airframes, steps, tracks, blocks)
         if bad >= 0 or blocks == count:

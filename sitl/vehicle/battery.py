@@ -13,9 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
-_FULL, _KNEE, _EMPTY = 4.2, 3.5, 3.0
-_KNEE_AT: Final = 0.1
-_PERIOD: Final = 100_000
+# Open-circuit voltages of a cell: full, at the knee of the curve, empty.
+_FULL_V, _KNEE_V, _EMPTY_V = 4.2, 3.5, 3.0
+_KNEE_CHARGE: Final = 0.1
+_PERIOD_US: Final = 100_000
 
 
 class BatteryConfig(BaseModel):
@@ -35,7 +36,7 @@ class Charge(NamedTuple):
     """State of a battery.
 
     ``voltage`` (V, of all cells), ``current`` (A), ``consumed`` (A s), ``remaining`` (0…1), and ``lasts``,
-    the time (s) until it is empty at this current.
+    the time (s) until the battery is empty at this current (or 0.01 A, if that is greater).
     """
 
     voltage: float
@@ -59,7 +60,7 @@ class Battery:
 
     def due(self, now: int) -> bool:
         """Return whether a step ends by ``now`` (µs)."""
-        return now - self._time >= _PERIOD
+        return now - self._time >= _PERIOD_US
 
     def advance(self, now: int, speeds: list[float]) -> None:
         """Advance to ``now`` (µs), with the rotors turning at ``speeds`` (rad/s)."""
@@ -77,10 +78,10 @@ class Battery:
         """Present state."""
         config, current = self._config, self._current
         remaining = self._left / self._capacity
-        if remaining >= _KNEE_AT:
-            cell = _KNEE + (_FULL - _KNEE) * (remaining - _KNEE_AT) / (1.0 - _KNEE_AT)
+        if remaining >= _KNEE_CHARGE:
+            cell = _KNEE_V + (_FULL_V - _KNEE_V) * (remaining - _KNEE_CHARGE) / (1.0 - _KNEE_CHARGE)
         else:
-            cell = _EMPTY + (_KNEE - _EMPTY) * remaining / _KNEE_AT
+            cell = _EMPTY_V + (_KNEE_V - _EMPTY_V) * remaining / _KNEE_CHARGE
         voltage = max(0.0, cell * config.cells - config.resistance * current)
         consumed = self._capacity * config.remaining - self._left
         return Charge(voltage, current, consumed, remaining, self._left / max(current, 0.01))

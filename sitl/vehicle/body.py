@@ -35,7 +35,7 @@ def body_axes(q: Quaternion) -> Axes:
 
 @kernel
 def turned(q: Quaternion, rotation: Vector) -> Quaternion:
-    """Return q ⊗ exp(rotation / 2): the attitude after a turn (rad) about a fixed body axis."""
+    """Return q ⊗ exp(rotation / 2): the attitude after a rotation vector (rad, body axes)."""
     half = times(0.5, rotation)
     square = dot(half, half)
     c, s = small_cosine_sinc(square)

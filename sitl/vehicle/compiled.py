@@ -14,7 +14,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 
-import sitl.vehicle.simd_compiled  # noqa: F401  (tells numba of the lanes)
+import sitl.vehicle.simd_compiled  # noqa: F401  (registers the lanes with numba)
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -33,7 +33,7 @@ def entry(function: _F) -> _F:
 
 
 def sources_digest(*names: str) -> int:
-    """Return a number that changes with the text of these files, for the closure of an ``entry``."""
+    """Return a digest of the text of these files (paths from this folder), for an ``entry``'s closure."""
     digest = hashlib.sha256()
     for name in names:
         digest.update((Path(__file__).parent / name).read_bytes())

@@ -1,6 +1,6 @@
 """Geometric tracking controller of Lee, Leok and McClamroch (CDC 2010) with complete feed-forward.
 
-Notation of the paper, e3 down: A is the force that the vehicle should receive apart from gravity's reaction,
+Notation of the paper, e3 down: A is the force, apart from gravity, that the vehicle should receive, and
 b3c = −A/‖A‖. Added to the paper: the rotor drag at zero wind can be cancelled (after Faessler, Franchi and
 Scaramuzza, 2018, who show that a drag linear in velocity only turns A), as can the disturbance estimated by
 ``observer``, and A can be limited to a greatest tilt.
@@ -92,8 +92,9 @@ def commanded_attitude(
 
     The paper takes b2c normal to b1d, which turns the nose of a tilted vehicle away from ψ by up to half its
     tilt squared. With ``euler_heading`` b1c instead lies in the vertical plane of b1d, so that ψ is the yaw
-    of MAVLink. If A vanishes, the thrust axis keeps its direction, and if b3c leaves no heading to choose, so
-    does the nose, both without feed-forward: the command then has no direction to follow.
+    of MAVLink. If A nearly vanishes, b3c is the present b3, without rates of change. If b3c is nearly along
+    b1d (with ``euler_heading``: along b1d's right), there is no heading to follow: the nose keeps its
+    direction, and Ω_c and Ω̇_c are zero.
     """
     still = (0.0, 0.0, 0.0)
     down = (times(-1.0, A[0]), times(-1.0, A[1]), times(-1.0, A[2]))

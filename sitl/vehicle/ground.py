@@ -18,9 +18,9 @@ GRAVITY = 9.80665
 
 _RIGHTING_TIME = 0.1
 """Time constant with which the gear levels a tilted vehicle on the ground (s)."""
-_TIPPED = 0.5
+_COS_LYING_TILT = 0.5
 """Cosine of the tilt beyond which the vehicle lies on its side and stays so."""
-_FLAT = 1e-9
+_LEVEL_TILT = 1e-9
 """Tilt (rad) that counts as level."""
 
 
@@ -31,8 +31,8 @@ def ground_contact(before: Motion, after: Motion, ground: float, airframe: Airfr
     Returns the motion and whether the vehicle stood on the ground. The ground stops the fall without a
     bounce. The impulse required for that limits, by Coulomb's law, the friction against sliding and turning,
     and, through the radius of the gear, the impulse that keeps the vehicle level. So a vehicle lifts off as
-    soon as thrust exceeds weight, and one at rest keeps its position to the last bit, because its velocities
-    after contact move it.
+    soon as thrust exceeds weight. A vehicle at rest keeps its position to the last bit, because the step is
+    integrated with the mean of the velocities before and after contact, both zero.
     """
     floor = ground - airframe.rest_height
     position, velocity, attitude, rates = after
@@ -64,8 +64,8 @@ def _stood(before: Motion, after: Motion, floor: float, airframe: Airframe) -> M
 
     impulse = airframe.mass * fall * airframe.gear_radius
     b1, b2, b3 = body_axes(before[2])
-    flat = _length(b1[2], b2[2]) < _FLAT
-    righting = where(flat | (b3[2] < _TIPPED), 0.0, 1.0 / _RIGHTING_TIME)
+    flat = _length(b1[2], b2[2]) < _LEVEL_TILT
+    righting = where(flat | (b3[2] < _COS_LYING_TILT), 0.0, 1.0 / _RIGHTING_TIME)
     settling = (-righting * b2[2], righting * b1[2])
     excess = (rates[0] - settling[0], rates[1] - settling[1])
     J = airframe.inertia

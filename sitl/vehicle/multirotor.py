@@ -79,7 +79,7 @@ def initial_states(
 
     The motors are off or, if ``hovering``, at hover speed. Positions (K, 3) in m, NED; yaws (K,) in rad;
     ``ground`` is the NED z (m). A vehicle on or below the ground is placed on its gear there. Raises
-    ValueError if it should hover there.
+    ValueError for such a vehicle if ``hovering``.
     """
     places = np.atleast_2d(np.asarray(positions, dtype=np.float64))
     half_yaws = 0.5 * np.asarray(yaws, dtype=np.float64)
@@ -104,7 +104,10 @@ def initial_states(
 def command_row(
     reference: Reference | None, *, idle: bool = False, wind: ArrayLike = _ZERO, ground: float = 0.0
 ) -> FloatArray:
-    """Return the command row (COMMAND_SIZE,) for ``advance_many``; arguments as for ``Vehicle``."""
+    """Return the command row (COMMAND_SIZE,) for ``advance_many``.
+
+    ``ground`` is the z of the ground (m, NED); other arguments as for ``Vehicle.advance``.
+    """
     row = np.zeros(COMMAND_SIZE)
     write_command(row, reference, idle, wind, ground)
     return row
@@ -140,7 +143,7 @@ def advance_many(
 
 
 def state_of(row: FloatArray) -> VehicleState:
-    """Return the state in a state row (STATE_SIZE + 2 n,); own copies."""
+    """Return the state in a state row (STATE_SIZE + 2 n,), in own copies; failed rotors turn more slowly."""
     row = row.copy()
     motors, left = row[STATE_SIZE:].reshape(2, -1)
     return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], motors * left, row[13:16], row[20:23])

@@ -2,8 +2,8 @@
 
 It takes the measurement of an inertial unit (specific force, and angular acceleration by Euler's equation)
 less the values of intact rotors at these motor speeds in still air. The rest (a wind, a failed rotor, a wrong
-mass) passes a first-order low-pass and is then countered by the controller. It is no integral of the error,
-so it does not wind up: a limit that keeps the rotors from producing the requested wrench is no disturbance.
+mass) passes a first-order low-pass, is limited, and is then cancelled by the controller. It is no integral of
+the control error, so it does not wind up when the rotors cannot produce the requested wrench.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def observed(
     known: Disturbance,
     force: Vector,
     moment: Vector,
-    sound_thrust: float,
-    sound_moment: Vector,
+    intact_thrust: float,
+    intact_moment: Vector,
     velocity: Vector,
     rates: Vector,
     axes: Axes,
@@ -47,22 +47,22 @@ def observed(
 ) -> Disturbance:
     """Return the disturbance after a physics step, from the one ``known`` before it.
 
-    ``force`` (N) and ``moment`` (N m) are those measured in the step, ``sound_thrust`` (N) and
-    ``sound_moment`` those of intact rotors, ``velocity`` (m/s) and ``rates`` (rad/s) those of the vehicle,
-    all in body axes; ``axes`` takes them to NED.
+    ``force`` (N) and ``moment`` (N m) are those measured in the step, ``intact_thrust`` (N) and
+    ``intact_moment`` those of intact rotors, ``velocity`` (m/s) and ``rates`` (rad/s) those of the vehicle,
+    all in body axes; ``axes`` are these axes in NED.
     """
     D = airframe.cancelled_drag
-    strange = (force[0] + D * velocity[0], force[1] + D * velocity[1], force[2] + sound_thrust)
-    push = plus(known[0], airframe.force_learnt, plus(to_ned(axes, strange), -1.0, known[0]))
-    square, most = dot(push, push), airframe.max_disturbance_force
-    beyond = square > most * most
+    unexplained = (force[0] + D * velocity[0], force[1] + D * velocity[1], force[2] + intact_thrust)
+    new_force = plus(known[0], airframe.force_learnt, plus(to_ned(axes, unexplained), -1.0, known[0]))
+    square, max_force = dot(new_force, new_force), airframe.max_disturbance_force
+    beyond = square > max_force * max_force
     if some(beyond):
-        push = times(where(beyond, most / math.sqrt(square), 1.0), push)
-    strange = plus(plus(moment, -1.0, sound_moment), 1.0, drag_moment(velocity, rates[2], airframe))
-    turn = plus(known[1], airframe.moment_learnt, plus(strange, -1.0, known[1]))
+        new_force = times(where(beyond, max_force / math.sqrt(square), 1.0), new_force)
+    unexplained = plus(plus(moment, -1.0, intact_moment), 1.0, drag_moment(velocity, rates[2], airframe))
+    new_moment = plus(known[1], airframe.moment_learnt, plus(unexplained, -1.0, known[1]))
     limit = airframe.max_disturbance_moment
-    return push, (
-        greatest(-limit[0], least(limit[0], turn[0])),
-        greatest(-limit[1], least(limit[1], turn[1])),
-        greatest(-limit[2], least(limit[2], turn[2])),
+    return new_force, (
+        greatest(-limit[0], least(limit[0], new_moment[0])),
+        greatest(-limit[1], least(limit[1], new_moment[1])),
+        greatest(-limit[2], least(limit[2], new_moment[2])),
     )

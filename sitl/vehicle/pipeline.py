@@ -60,7 +60,7 @@ def command_motors(
     airframe: Airframe,
     commanded: FloatArray,
 ) -> None:
-    """Write the commanded motor speeds (n,) (rad/s) ``t`` seconds into a command."""
+    """Write the commanded motor speeds (n,) (rad/s), ``t`` seconds after the start of a command row."""
     mode = at(command, 0)
     if some(mode >= FLYING):
         position, velocity, attitude, rates = motion
@@ -109,12 +109,12 @@ def physics_step(
     rates = plus(motion[3], half, angular_acceleration)
     axes = body_axes(turned(motion[2], times(half, motion[3])))
     air_velocity = to_body(axes, plus(velocity, -1.0, wind))
-    force, moment, sound, sound_moment = wrench(speeds, left, air_velocity, rates, airframe)
+    force, moment, intact_thrust, intact_moment = wrench(speeds, left, air_velocity, rates, airframe)
     half_step(speeds, commanded, airframe)
     moved = free_flight(motion, force, moment, airframe)
     moved, standing = ground_contact(motion, moved, at(command, 22), airframe)
     known = observed(
-        known, force, moment, sound, sound_moment, to_body(axes, velocity), rates, axes, airframe
+        known, force, moment, intact_thrust, intact_moment, to_body(axes, velocity), rates, axes, airframe
     )
     still = (0.0, 0.0, 0.0)
     idle = standing | (at(command, 0) < FLYING)

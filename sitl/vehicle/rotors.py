@@ -42,7 +42,7 @@ def wrench(
     velocity through the air in the plane of the rotor.
     """
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    sound, sound_moment = 0.0, (0.0, 0.0, 0.0)
+    intact_thrust, intact_moment = 0.0, (0.0, 0.0, 0.0)
     for i in range(airframe.rotor_x.size):
         x, y, z = airframe.rotor_x[i], airframe.rotor_y[i], airframe.rotor_z[i]
         torque = airframe.rotor_spin[i] * airframe.k_m
@@ -61,7 +61,7 @@ def wrench(
         )
         moment = plus(moment, 1.0, turn)
         moment = plus(moment, -roll, (hub_x, hub_y, 0.0))
-        whole = airframe.k_f * (motor * motor)
-        sound = sound + whole
-        sound_moment = plus(sound_moment, whole, (-y, x, torque))
-    return force, moment, sound, sound_moment
+        full_thrust = airframe.k_f * (motor * motor)
+        intact_thrust = intact_thrust + full_thrust
+        intact_moment = plus(intact_moment, full_thrust, (-y, x, torque))
+    return force, moment, intact_thrust, intact_moment

@@ -1,4 +1,4 @@
-"""Lanes: numbers of the kernels that are one double, or eight for eight vehicles side by side.
+"""Lanes: a number of a kernel is one double, or eight doubles for eight vehicles side by side.
 
 A kernel is compiled for ``float`` and, for a block of vehicles, for *lanes*: a vector of eight doubles that
 the machine's wide registers process at once. Both come from the same source, every operation on a lane is the
@@ -45,7 +45,7 @@ def at(row: FloatArray, column: int) -> float:
 
 
 def put(row: FloatArray, column: int, value: float) -> None:
-    """Set the value that ``at`` reads."""
+    """Set a column of a row, or the lanes of a block's column."""
     row[column] = value
 
 
@@ -55,5 +55,5 @@ def three_at(row: FloatArray, column: int) -> tuple[float, float, float]:
 
 
 def put_three(row: FloatArray, column: int, value: tuple[float, float, float]) -> None:
-    """Set the values that ``three_at`` reads."""
+    """Set three columns from ``column`` on."""
     row[column], row[column + 1], row[column + 2] = value

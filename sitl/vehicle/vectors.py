@@ -14,13 +14,13 @@ Axes = tuple[Vector, Vector, Vector]
 
 @kernel
 def least(a: float, b: float) -> float:
-    """Return the smaller one; b if they cannot be compared."""
+    """Return the smaller number; b if either is NaN."""
     return where(a < b, a, b)
 
 
 @kernel
 def greatest(a: float, b: float) -> float:
-    """Return the greater one; b if they cannot be compared."""
+    """Return the greater number; b if either is NaN."""
     return where(a > b, a, b)
 
 

@@ -33,14 +33,14 @@ _EXTRAS: Final = {
     "dask": "cluster",
     "distributed": "cluster",
 }
-"""Packages that only an extra installs, and the name of that extra."""
-# Click's UsageError: typer has no name of its own for it, and newer versions bring their own click.
+"""Optional packages, and the extra that installs each."""
+# Click's UsageError: typer does not export it, and newer versions contain their own copy of click.
 _UsageError: Final = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 
 
 @app.callback()
 def _root() -> None:
-    """Keep every command a sub-command."""
+    """Make typer treat every command as a sub-command."""
 
 
 for _command in (swarm, view, sitl, doctor, fly, sweep, paper, gallery, replay, export, report, key, bench):
@@ -50,7 +50,8 @@ for _command in (swarm, view, sitl, doctor, fly, sweep, paper, gallery, replay, 
 def main() -> None:
     """Run the command line.
 
-    Bad input ends with status 2 and one line for each fault, never with a traceback.
+    Bad input ends with status 2 and one line per fault; other errors and interruptions with status 3. A
+    traceback is shown only for an internal fault if OUTRIDER_TRACEBACK is set.
     """
     from mavlink_bridge.errors import BridgeError
 
@@ -73,7 +74,7 @@ def main() -> None:
         sys.stderr.write(f"outrider: {error}\n")
         sys.exit(FAULT)
     except Exception as error:
-        # An internal fault must not look like a collision, which has status 1.
+        # An internal fault must not have the status of a collision, 1.
         if os.environ.get("OUTRIDER_TRACEBACK"):
             raise
         sys.stderr.write(f"outrider: {_words(error)}\n")
@@ -85,7 +86,7 @@ def main() -> None:
 
 
 def _words(error: Exception) -> str:
-    """Return what went wrong, and the remedy."""
+    """Return the error and a remedy as text."""
     if isinstance(error, ModuleNotFoundError):
         package = (error.name or "").partition(".")[0]
         if package in _EXTRAS:

@@ -8,7 +8,7 @@ from mavlink_bridge.links.endpoints import Endpoint, Multicast, TcpIn, TcpOut, U
 
 
 def exposed(endpoint: Endpoint) -> bool:
-    """Return whether other machines can reach the endpoint or receive its data.
+    """Return whether other machines can reach the endpoint or receive its data; False for serial and logs.
 
     A host name other than ``localhost`` counts as another machine.
     """

@@ -6,7 +6,7 @@ from typing import ClassVar, NamedTuple
 
 
 class OutriderError(Exception):
-    """Base class of every error of ``outrider``; without a subclass it is an internal fault."""
+    """Base class of every error of ``outrider``; the base class itself means a failed or stopped run."""
 
     exit_status: ClassVar[int] = 3
 
@@ -31,8 +31,8 @@ class Fault(NamedTuple):
 class InputError(OutriderError):
     """Unusable input of the user.
 
-    The message is one line for each fault, in the order of the file. A fault that is not part of a file (an
-    argument) is a plain text.
+    The message is one line per fault, in the order given. A fault outside a file, as of an argument, is a
+    plain text.
     """
 
     exit_status = 2
@@ -46,5 +46,5 @@ class InputError(OutriderError):
 
 
 def _one_line(text: str) -> str:
-    """Return ``text`` with each character that would break a line or control a terminal as an escape."""
+    """Return ``text`` with every unprintable character replaced by its escape sequence."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

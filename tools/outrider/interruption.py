@@ -18,9 +18,9 @@ INTERRUPTED = 3
 
 @contextmanager
 def interruptible(left: str) -> Iterator[None]:
-    """Handle SIGTERM inside the context like Ctrl-C: files are closed, and OutriderError reports ``left``.
+    """Handle SIGTERM inside the context like Ctrl-C; raise OutriderError for both, with ``left`` in its text.
 
-    In a thread other than the main one the signal handlers stay unchanged.
+    In a thread other than the main one do nothing.
     """
 
     def stop(_signal: int, _frame: FrameType | None) -> None:
@@ -47,7 +47,7 @@ class ReceivedSignal(NamedTuple):
 
 @contextmanager
 def noted(signals: Sequence[signal.Signals]) -> Iterator[list[ReceivedSignal]]:
-    """Record those of ``signals`` that arrive instead of letting them end the process."""
+    """Record received ``signals`` in the yielded list, in place of their usual handling."""
     came: list[ReceivedSignal] = []
 
     def note(which: int, _frame: FrameType | None) -> None:
@@ -62,11 +62,11 @@ def noted(signals: Sequence[signal.Signals]) -> Iterator[list[ReceivedSignal]]:
 
 
 def insisted(came: Sequence[ReceivedSignal]) -> bool:
-    """Return whether a stop was requested again.
+    """Return whether a stop was requested again, at least 1 s after the first request.
 
-    A signal to a group of processes may arrive twice within a moment; that counts as one request.
+    A signal to a process group may arrive twice within a moment; this counts as one request.
     """
-    return bool(came) and any(one.at - came[0].at >= _AGAIN for one in came)
+    return bool(came) and any(one.at - came[0].at >= _MIN_REPEAT_S for one in came)
 
 
-_AGAIN = 1.0
+_MIN_REPEAT_S = 1.0

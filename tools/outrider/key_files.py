@@ -1,4 +1,4 @@
-"""Key files on the command line; a fault of one is bad input."""
+"""Key files given on the command line; a faulty file is bad input (InputError)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from outrider.errors import InputError
 
 
 def key_of(path: Path) -> Key:
-    """Return the key in a file; raise InputError if there is none, or if others may read it."""
+    """Return the key in a file; raise InputError if it cannot be read, or if other users may read it."""
     try:
         return read_key(path)
     except KeyFileError as error:

@@ -1,6 +1,6 @@
 """JSON Schemas of the configuration, for editors: ``python -m outrider.schemas config/schemas`` writes them.
 
-A shipped file names its schema in its first line, which `schema_line` composes.
+A shipped file names its schema in its first line, which ``schema_line`` returns.
 """
 
 from __future__ import annotations

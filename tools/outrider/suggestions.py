@@ -7,11 +7,11 @@ from difflib import get_close_matches
 from pathlib import Path
 
 LONGEST_WORD = 60
-"""Characters. A longer text is no mistyped word, and comparing it would take long."""
+"""Maximum length of a compared word (characters): longer texts are no mistyped words and take long."""
 
 
 def nearest(word: str, valid: Iterable[str]) -> str | None:
-    """Return the word of ``valid`` most like ``word`` regardless of case, or None if none is alike."""
+    """Return the word of ``valid`` most similar to ``word`` regardless of case; None if none is similar."""
     if len(word) > LONGEST_WORD:
         return None
     by_folded = {candidate.casefold(): candidate for candidate in valid if len(candidate) <= LONGEST_WORD}
@@ -26,7 +26,10 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
 
 
 def neighbours(path: Path, suffixes: tuple[str, ...] = (".yaml", ".yml"), most: int = 8) -> list[str]:
-    """Return existing files near the missing ``path``: the most similar first, then others by suffix."""
+    """Return at most ``most`` names in the folder of the missing ``path``.
+
+    The most similar name comes first, then the others that end with one of ``suffixes``, sorted.
+    """
     try:
         names = sorted(entry.name for entry in path.parent.iterdir())
     except OSError:

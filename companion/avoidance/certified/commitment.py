@@ -1,9 +1,9 @@
 """Committed plan of one vehicle from epoch to epoch: when to hold, when to replan, which plan to announce.
 
-In the epoch that begins at t_e every vehicle flies its plan of t_e and makes that of t_{e+1}: by solving, as
-soon as it holds the plans of t_e of its whole coordination set; or, when the epoch is nearly over, by
+In the epoch that begins at t_e every vehicle flies its plan of t_e and makes its plan of t_{e+1}: by solving,
+as soon as it holds the plans of t_e of its whole coordination set; or, when the epoch is nearly over, by
 carrying its own plan on. In both cases it announces the plan of t_{e+1}, and repeats it until the next one.
-Delivery is never needed for safety, only for progress.
+Delivery of messages is never needed for safety, only for progress.
 """
 
 from __future__ import annotations
@@ -32,36 +32,38 @@ from mavlink_bridge.wire.plan import WirePlan, quantise
 class HoldReason(Enum):
     """Reason for carrying a plan on instead of making a new one."""
 
-    MISSING = "a plan of somebody who counts has not arrived"
-    CLOCK = "the clock of somebody who counts is wrong, or our own"
+    MISSING = "an input is missing: a member's plan or roster, the own position, or the destination"
+    CLOCK = "the clock of a member, or the own clock, is wrong"
     UNSOLVED = "no plan that keeps all planes was found"
 
 
 class Commitment:
     """Owner of ``current``, the plan that is flown, and ``following``, the plan of the next epoch once made.
 
-    An epoch (µs) is a whole number of knots. ``program`` and ``stall`` make plans; the constraints are passed
-    with each plan.
+    An epoch (µs) is a whole number of knots. ``program`` solves for plans, ``deadlock_turn`` is updated by
+    them, and the constraints are passed with each plan. ``held`` counts, by reason, how often the plan was
+    carried on; ``anchored_anew`` how often planning restarted at the measured motion.
     """
 
     def __init__(
         self,
         config: CertifiedConfig,
         program: SeparationQp,
-        stall: DeadlockTurn,
+        deadlock_turn: DeadlockTurn,
         origin: int,
         *,
         planar: bool = False,
     ) -> None:
-        self._config, self._program, self._stall, self._origin = config, program, stall, origin
+        self._config, self._program, self._origin = config, program, origin
+        self._deadlock_turn = deadlock_turn
         self._planar = planar
         self._rounding = rounding(program.n, config.dt_us)
         self.announced_until = 0
         """Last epoch (µs) of which a plan was announced."""
         self.current: WirePlan | None = None
-        # Caches of what is derived from ``current``, and from both plans: it is needed several times.
-        self._ahead: tuple[WirePlan, WirePlan, Array] | None = None
-        self._flown: tuple[WirePlan, WirePlan | None, Horizon] | None = None
+        # Caches of values derived from ``current``, and from both plans, which are needed several times.
+        self._carried_cache: tuple[WirePlan, WirePlan, Array] | None = None
+        self._horizon_cache: tuple[WirePlan, WirePlan | None, Horizon] | None = None
         self.following: WirePlan | None = None
         self.held: dict[HoldReason, int] = dict.fromkeys(HoldReason, 0)
         self.anchored_anew = 0
@@ -83,18 +85,18 @@ class Commitment:
         if self.following is not None and self.following.epoch <= epoch:
             self.current, self.following = self.following, None
         if self.current is not None and self.current.epoch < epoch:
-            # No plan was made or announced in the meantime, so no vehicle can rely on another one.
+            # No plan was announced in the meantime, so no vehicle can rely on a newer plan.
             self.current = carried_on(self.current, (epoch - self.current.epoch) // self.current.dt)
         return self.current is not None and self.following is None
 
     def last_call(self, now: int) -> bool:
-        """Return whether the epoch is so nearly over that nothing is waited for any longer."""
+        """Return whether at most ``last_call_us`` of the epoch is left: then the plan is carried on."""
         return now + self._config.last_call_us >= self.epoch(now) + self._config.epoch_us
 
-    def carry_on(self, why: HoldReason) -> None:
+    def carry_on(self, reason: HoldReason) -> None:
         """Continue the committed plan in the next epoch, and count the reason."""
         self.following = self.start()
-        self.held[why] += 1
+        self.held[reason] += 1
 
     def own(self) -> Array:
         """Return control points (n, 3, 3) of the committed plan from the next epoch on, m."""
@@ -107,25 +109,30 @@ class Commitment:
         """
         return self._carried()[0]
 
-    def replan(self, wish: Objective, goal: Array, others: Others) -> bool:
-        """Make the next epoch's plan; return False if none was found and the old one is carried on."""
+    def replan(self, objective: Objective, goal: Array, others: Others) -> bool:
+        """Make the next epoch's plan; return False if none was found and the old plan is carried on.
+
+        Raises CompanionError without a committed plan.
+        """
         start, own = self._carried()
         corridor = planes(own, others, self._config.spare, upright=self._planar)
-        state = State(start.position_m, start.velocity_m_s, self._flown_until(), start.accelerations_m_s2)
-        # Without room, rounding breaks what is only just kept: the second attempt asks for slightly more.
-        firmly = np.maximum(corridor.wanted, corridor.least + self._rounding)
-        for asked in (corridor, corridor._replace(wanted=firmly)):
+        state = State(
+            start.position_m, start.velocity_m_s, self._last_acceleration(), start.accelerations_m_s2
+        )
+        # Rounding may violate a plane that is only just kept: the second attempt adds the rounding error.
+        with_rounding = np.maximum(corridor.wanted, corridor.least + self._rounding)
+        for attempt in (corridor, corridor._replace(wanted=with_rounding)):
             try:
-                answer = self._program.solve(state, wish, asked)
+                answer = self._program.solve(state, objective, attempt)
                 plan = committed(start, answer.accelerations)
             except (SolverError, CertificateError):
                 continue
             points = controls(plan)
-            # The rounded plan is checked: it is the one that the others will hold.
+            # The rounded plan is checked, because the others receive the rounded one.
             kept = np.einsum("mnk,nik->mni", corridor.normals, points) - corridor.least
             if kept.min(initial=np.inf) >= 0.0:
                 push = np.einsum("mni,mnk->k", answer.plane_multipliers, corridor.normals)
-                self._stall.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
+                self._deadlock_turn.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
                 self.following = plan
                 return True
         self.carry_on(HoldReason.UNSOLVED)
@@ -134,7 +141,8 @@ class Commitment:
     def anchor(self, now: int, measured: Motion) -> None:
         """Plan the next epoch anew from the ``measured`` motion, to rest.
 
-        This is for a jump or a push out of the tube. The transition between two such plans is not certified.
+        This is for a vehicle far from its plan, after a jump of its position or a push. The transition from
+        the old plan to this one is not certified.
         """
         begins = self.epoch(now) + self._config.epoch_us
         left = 1e-6 * (begins - now)
@@ -153,22 +161,26 @@ class Commitment:
         self.anchored_anew += 1
 
     def horizon(self) -> Horizon | None:
-        """Return the horizon flown from now on: this epoch's plan, and the next one's where it is made."""
+        """Return the flown horizon: this epoch's plan, followed by the next one's once that is made."""
         if self.current is None:
             return None
-        if self._flown is None or self._flown[0] is not self.current or self._flown[1] is not self.following:
+        if (
+            self._horizon_cache is None
+            or self._horizon_cache[0] is not self.current
+            or self._horizon_cache[1] is not self.following
+        ):
             horizon = horizon_of(self.current)
             if self.following is not None:
                 first, rest = horizon.knots[: self._config.knots], horizon_of(self.following).knots
                 horizon = horizon._replace(knots=np.vstack([first, rest]))
-            self._flown = self.current, self.following, horizon
-        return self._flown[2]
+            self._horizon_cache = self.current, self.following, horizon
+        return self._horizon_cache[2]
 
     def announced(self) -> WirePlan | None:
-        """Return the plan to announce now."""
+        """Return the plan to announce now: the next epoch's once it is made; None without any plan."""
         return self.current if self.following is None else self.following
 
-    def _flown_until(self) -> Array:
+    def _last_acceleration(self) -> Array:
         """Return the acceleration (3,), m/s², with which this epoch ends."""
         if self.current is None:
             return np.zeros(3)
@@ -179,7 +191,7 @@ class Commitment:
         """Return the committed plan from the next epoch on, and its control points (n, 3, 3), m."""
         if self.current is None:
             raise CompanionError("there is no committed plan yet")
-        if self._ahead is None or self._ahead[0] is not self.current:
+        if self._carried_cache is None or self._carried_cache[0] is not self.current:
             plan = carried_on(self.current, self._config.knots)
-            self._ahead = self.current, plan, controls(plan)
-        return self._ahead[1:]
+            self._carried_cache = self.current, plan, controls(plan)
+        return self._carried_cache[1:]

@@ -1,9 +1,9 @@
-"""Committed plans: integer trajectories on absolute knots that end at rest, so that each is valid for ever.
+"""Committed plans: integer trajectories on absolute knots that end at rest, so each stays valid for ever.
 
 With positions in units of ½ A dt² and velocities in A dt (A = 1 mm/s²; see ``mavlink_bridge.wire.plan``) the
 motion over a knot is p' = p + 2v + a, v' = v + a, and the segment between is the quadratic Bézier curve with
-the control points p, p + v, p'. All of this is exact in integers: advancing by a knot, coming to rest, and
-what a receiver decodes from the bytes.
+the control points p, p + v, p'. Advancing by a knot, coming to rest, and decoding on the receiver's side are
+all exact in integers.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def rests(plan: WirePlan) -> bool:
 
 
 def carried_on(plan: WirePlan, knots: int) -> WirePlan:
-    """Return the same motion from ``knots`` (≥ 0) later on, as long as before, filled with rest at its end.
+    """Return the same motion from ``knots`` (≥ 0) later on, with as many knots, filled with rest at its end.
 
     Raises CertificateError for a plan that does not end at rest.
     """
@@ -48,8 +48,8 @@ def carried_on(plan: WirePlan, knots: int) -> WirePlan:
 def committed(start: WirePlan, accelerations: Array) -> WirePlan:
     """Return the plan from the state that ``start`` begins with, with ``accelerations`` (n, 3), m/s².
 
-    They are rounded to the wire; the last one is what brings the plan to rest exactly. Raises
-    CertificateError if one is not finite.
+    They are rounded to the wire; the last one is replaced by the one that brings the plan to rest exactly.
+    Raises CertificateError if one is not finite.
     """
     if not np.isfinite(accelerations).all():
         raise CertificateError("an acceleration is not finite")
@@ -60,9 +60,9 @@ def committed(start: WirePlan, accelerations: Array) -> WirePlan:
 
 
 def rounding(steps: int, dt: int) -> Array:
-    """Return how far (n, 3), m, rounding moves the control points of a plan at most.
+    """Return upper bounds (n, 3), m, on how far rounding moves the control points of a plan.
 
-    An acceleration is off by half a unit at most.
+    Each acceleration is off by half a unit at most on each axis.
     """
     n = np.arange(steps)
     units = np.stack([n**2, n**2 + n, (n + 1) ** 2], axis=1)

@@ -20,8 +20,8 @@ from companion.obstacles.static import Axes, FixedObstacles
 from companion.values.horizon import Array
 from companion.world import View, World
 
-_STEPS_OF_SIGHT = 1.0
-"""Distance (m) beyond what matters for certain, so that nothing comes into sight in the middle of a plan."""
+_SIGHT_MARGIN_M = 1.0
+"""Distance (m) added to the largest one at which an obstacle can constrain a plan."""
 
 
 class ConstraintSources:
@@ -34,27 +34,27 @@ class ConstraintSources:
         """Least distance (m) between two plans."""
         self._margin = margin(own, config.field, config.limits)
         self._beside = beside(own, config.field, config.limits)
-        self._lost = config.guard.neighbour_lost_us
+        self._silent_us = config.guard.neighbour_lost_us
         self._posts = FixedObstacles(tuple(o for o in config.obstacles if isinstance(o, Post)))
         self._balls = FixedObstacles(tuple(o for o in config.obstacles if not isinstance(o, Post)))
         self._noncooperative = NonCooperative(config, steps)
-        self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + self.between + _STEPS_OF_SIGHT
+        self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + self.between + _SIGHT_MARGIN_M
 
     def around(
         self, now: int, epoch: int, own: Array, peers: PeerPlans, world: World, view: View
     ) -> tuple[Others, Array]:
         """Return the constraints of the plan that begins one epoch after ``epoch`` (µs), and the field.
 
-        They are as known at ``now`` (µs). The field f (n, 3), m/s², is what the plan yields to where it can.
+        They are as known at ``now`` (µs). The field f (n, 3), m/s², acts in the plan's cost only.
         ``own`` (n, 3, 3), m: the committed control points from the next epoch on.
         """
         plans = [filed.controls for filed in peers.plans(epoch).values()]
-        aside = self._aside(now, peers, world)
-        # A vehicle drifts while it descends; one that is further off may be flown by another controller, at
-        # any height. Once silent it counts as down where it was: a vehicle switched off on the ground is no
-        # growing danger.
-        taken = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
-        members = peers.members.union(peers.left.keys() - taken)
+        aside = self._beside_last_plan(now, peers, world)
+        # A vehicle that said farewell may drift while it descends. One that is further from its last plan may
+        # be flown by another controller, at any height: it counts as non-cooperative while it sends. Once it
+        # is silent it counts as landed where it was, because it may be switched off.
+        taken_over = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
+        members = peers.members.union(peers.left.keys() - taken_over)
         begins = epoch + self._config.certified.epoch_us
         seen = self._noncooperative.seen(begins, members, world)
         noncooperative = [
@@ -63,22 +63,27 @@ class ConstraintSources:
         ]
         sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
         ends = [filed.controls[-1, 2] for filed in peers.left.values()]
-        down = [*ends, *(place for system, (_, place, _) in aside.items() if system not in taken)]
-        alone = [*self._standing(own), *self._down(own, down), *noncooperative, *self._seen(sensed)]
+        landed = [*ends, *(place for system, (_, place, _) in aside.items() if system not in taken_over)]
+        unshared = [
+            *self._fixed_constraints(own),
+            *self._landed_constraints(own, landed),
+            *noncooperative,
+            *self._sensed_constraints(sensed),
+        ]
         count, n = len(plans), self._steps
-        controls = np.empty((count + len(alone), n, 3, 3))
+        controls = np.empty((count + len(unshared), n, 3, 3))
         if plans:
             controls[:count] = _later(np.array(plans), self._config.certified.knots)
         distance = np.full((len(controls), n), self.between)
-        for index, (centres, radii) in enumerate(alone, count):
+        for index, (centres, radii) in enumerate(unshared, count):
             controls[index], distance[index] = centres, radii
         others = Others(controls, distance, np.arange(len(controls)) < count)
         return others, self._noncooperative.field(seen, own, sensed)
 
-    def _standing(self, own: Array) -> list[tuple[Array, Array]]:
-        """Return spheres about their centres, and posts beside the vehicle, whatever its height.
+    def _fixed_constraints(self, own: Array) -> list[tuple[Array, Array]]:
+        """Return the fixed obstacles near the plan: spheres at their centres, posts at the plan's height.
 
-        Posts count as if they had no top.
+        So posts act as if they had no top.
         """
         points = own.reshape(-1, 3)
         found = []
@@ -94,10 +99,11 @@ class ConstraintSources:
                 found.append((centres, np.full(self._steps, least)))
         return found
 
-    def _seen(self, sensed: Axes) -> list[tuple[Array, Array]]:
-        """Return what sensors detect, and the predicted ways of traffic, as if these stood still.
+    def _sensed_constraints(self, sensed: Axes) -> list[tuple[Array, Array]]:
+        """Return what sensors detect, and the predicted paths of traffic, as fixed obstacles.
 
-        A plan only yields to one that comes into sight within the committed plan.
+        If an obstacle appears nearer to the committed plan than the least distance, its planes keep only the
+        present distance; the field then moves the plan away.
         """
         least = self._config.field.d_min + self._margin
         places = sensed.positions.reshape(-1, self._steps, 3, 3)
@@ -106,11 +112,13 @@ class ConstraintSources:
             for place, radius in zip(places, sensed.radius, strict=True)
         ]
 
-    def _aside(self, now: int, peers: PeerPlans, world: World) -> dict[int, tuple[float, Array, bool]]:
-        """Return the vehicles that said farewell and reported a position beside their last plan since.
+    def _beside_last_plan(
+        self, now: int, peers: PeerPlans, world: World
+    ) -> dict[int, tuple[float, Array, bool]]:
+        """Return the vehicles that said farewell and have since reported a position beside their last plan.
 
-        The values are the distance (m) from that plan, the position (3,), m, and whether messages still
-        arrive. Heights do not count, and the difference between two estimates of one position is tolerated.
+        The values, by system id, are the horizontal distance (m) from this plan, the position (3,), m, and
+        whether messages still arrive. Differences up to ``margins.beside`` are tolerated.
         """
         found: dict[int, tuple[float, Array, bool]] = {}
         left = peers.left
@@ -122,10 +130,10 @@ class ConstraintSources:
             apart = position - horizon_of(left[system].plan).at(time).position
             off = hypot(apart[0], apart[1])
             if off > self._beside:
-                found[system] = off, position, now - time <= self._lost
+                found[system] = off, position, now - time <= self._silent_us
         return found
 
-    def _down(self, own: Array, places: list[Array]) -> list[tuple[Array, Array]]:
+    def _landed_constraints(self, own: Array, places: list[Array]) -> list[tuple[Array, Array]]:
         """Return constraints at ``places`` (3,) of vehicles that said farewell, descending or on the ground.
 
         No vehicle flies over them: heights do not count.

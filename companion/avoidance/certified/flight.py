@@ -27,7 +27,7 @@ _TURNING_SENSES = {"left": -1.0}
 
 
 class CertifiedFlight:
-    """Committed plan, peers' plans and constraint sources of one vehicle."""
+    """Certified mode of one vehicle: its committed plan, the peers' plans and the constraint sources."""
 
     def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
         certified, steps = config.certified, config.horizon.steps + 1
@@ -66,7 +66,7 @@ class CertifiedFlight:
         """Time (s) from now to the end of the plan that is made next, at most."""
 
     def receive(self, now: int, message: Tunnel | Timesync) -> None:
-        """Receive a TUNNEL or TIMESYNC of the swarm link."""
+        """Receive a TUNNEL or TIMESYNC of the swarm link; count rosters that cannot be decoded as refused."""
         system = message.source.system
         if isinstance(message, Timesync):
             self._replies += self.clocks.receive(now, message)
@@ -131,7 +131,7 @@ class CertifiedFlight:
 
     @property
     def lost(self) -> bool:
-        """Whether the vehicle is further than ``guard.tube`` (m) from its plan, which then begins anew."""
+        """Whether the vehicle is further than ``guard.tube`` (m) from its plan: planning then begins anew."""
         return self.deviation > self._config.guard.tube
 
     def plan(self, now: int, aim: Aim, world: World, view: View) -> bool:
@@ -145,8 +145,8 @@ class CertifiedFlight:
         others, field = self._sources.around(now, commitment.epoch(now), own, self.peers, world, view)
         goal = self._deadlock_turn.turned(start.position_m, aim.destination)
         places = goal + self._before_end[:, None] * aim.velocity
-        wish = Objective(places, np.broadcast_to(aim.velocity, places.shape), field)
-        return commitment.replan(wish, aim.destination, others)
+        objective = Objective(places, np.broadcast_to(aim.velocity, places.shape), field)
+        return commitment.replan(objective, aim.destination, others)
 
     def idle(self, now: int) -> bool:
         """Return whether there is nothing to make or to announce until something else is due."""
@@ -161,10 +161,10 @@ class CertifiedFlight:
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
         """Return the messages for the swarm link now.
 
-        They are TIMESYNC messages, and the newest plan with its roster (the coordination set that it was made
-        with), at once and then every ``repeat_us``. ``farewell``: the vehicle makes no further plan; that is
-        announced once it flies the last one. Without ``farewell``, call ``due`` or ``stand`` at ``now``
-        first: otherwise the vehicle counts as not in control, and no plan is announced.
+        They are TIMESYNC messages, and the newest plan with its roster (the present coordination set), at
+        once and then every ``repeat_us``. ``farewell``: the vehicle makes no further plan; the roster says so
+        once the vehicle flies the last one. Without ``farewell``, call ``due`` or ``stand`` at ``now`` first:
+        otherwise the vehicle counts as not in control, and no plan is announced.
         """
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()

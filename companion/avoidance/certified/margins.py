@@ -16,7 +16,7 @@ from companion.values.horizon import Array
 
 
 def fastest(limits: LimitsConfig) -> float:
-    """Return the largest speed, m/s, of a plan that is as fast as allowed on each axis."""
+    """Return the largest speed of a plan, m/s: the norm of v_max."""
     return sqrt(sum(v * v for v in limits.v_max))
 
 
@@ -35,9 +35,9 @@ def between(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -
 
 
 def beside(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
-    """Return how far (m) from its plan a vehicle may report to be, long after it stopped there.
+    """Return how far (m) from the end of its plan a vehicle at rest there may report its position.
 
-    The vehicle has not moved since: its estimate then and its estimate now both have errors.
+    The position estimate at the time of the plan and the reported estimate both have errors.
     """
     return _strays(config, limits) + sqrt(2.0) * config.sigmas * field.position_sigma
 
@@ -53,9 +53,10 @@ def reachable(
     """Return balls that hold a non-cooperative vehicle: centres (n, 3, 3) and radii (n,), m.
 
     The vehicle flies at ``speed`` (m/s) and with ``acceleration`` (m/s²) at most. The centres are those at
-    the control points of n segments. It was at ``position`` (3,), m, with ``velocity`` (3,), m/s, ``age``
-    seconds before the first of n + 1 knots, which are at ``seconds`` (n + 1,). Two balls hold it: one about
-    where it was, one about where it would be at constant velocity; the smaller one counts.
+    the control points of n segments, the radii those at the segments' ends. The vehicle was at ``position``
+    (3,), m, with ``velocity`` (3,), m/s, ``age`` seconds before time 0 of ``seconds`` (n + 1,), the knots.
+    Two balls hold it: one about its last position, one about the position at constant velocity; the smaller
+    one is returned.
     """
     later = age + seconds
     begin, end = later[:-1], later[1:]

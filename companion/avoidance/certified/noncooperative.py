@@ -1,8 +1,8 @@
 """Non-cooperative vehicles: balls that hold them, and the paper's field around them.
 
-Planes keep clear of the balls; a plan yields to the field where it can. The planes ask for no more distance
-than there is: they do not drive the vehicle away from one that comes nearer by itself. The field does, as far
-as other plans leave room.
+Planes keep plans clear of the balls; the field acts in the cost of the plan. Inside the least distance the
+planes keep only the present distance: they do not drive the vehicle away from another that comes nearer by
+itself. The field does, as far as other plans leave room.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from companion.values.obstacles import Obstacles
 from companion.values.vectors import limit
 from companion.world import View, World
 
-_NEAREST_COUNTS = 20.0
-"""Clamp of one force, as a multiple of a_total.
+_MAX_FORCE_FACTOR = 20.0
+"""Clamp of the force of one obstacle, as a multiple of a_total.
 
-The sum of the field is limited, not its parts (see ``companion.avoidance.field.planner``).
+The sum of the forces is limited to a_total itself (see ``companion.avoidance.field.planner``).
 """
 
 
 class NonCooperativeVehicle(NamedTuple):
     """Non-cooperative vehicle as last received.
 
-    Its ``position`` (3,), m, and ``velocity`` (3,), m/s; ``age``: time from then to the next epoch, s;
+    ``position`` (3,), m; ``velocity`` (3,), m/s; ``age``: time from its last message to the next epoch, s;
     ``least``: least distance (m) from it; ``upright``: heights do not count.
     """
 
@@ -49,25 +49,28 @@ class NonCooperative:
     def __init__(self, config: CompanionConfig, steps: int) -> None:
         self._config, self._steps = config, steps
         own = config.certified
-        self._vehicle = between(own, config.field, config.limits)
+        self._least_to_vehicle = between(own, config.field, config.limits)
         away = margin(own, config.field, config.limits)
-        self._exact = exact = config.field.d_min + away
-        # The reported position of a moving obstacle counts as exact.
-        self._things = {
+        self._least_distance = exact = config.field.d_min + away
+        # The reported position of a moving obstacle is assumed to be exact.
+        self._moving_obstacles = {
             one.system: (exact + one.radius, isinstance(one, MovingPost)) for one in config.moving
         }
         self._target = None if config.target_d_min is None else config.target_d_min + away
         self._seconds: Array = 1e-6 * own.dt_us * np.arange(steps + 1.0)
 
     def seen(self, begins: int, members: Set[int], world: World) -> list[NonCooperativeVehicle]:
-        """Return the received vehicles except ``members``, for the epoch that begins at ``begins`` (µs)."""
+        """Return all received vehicles except ``members``, with their ages at ``begins`` (µs)."""
         found = []
         for system, time, position, velocity in world.neighbours.last_received():
             if system not in members:
                 age = max(1e-6 * (begins - time), 0.0)
                 found.append(
                     NonCooperativeVehicle(
-                        position, velocity, age, *self._things.get(system, (self._vehicle, False))
+                        position,
+                        velocity,
+                        age,
+                        *self._moving_obstacles.get(system, (self._least_to_vehicle, False)),
                     )
                 )
         return found
@@ -87,17 +90,18 @@ class NonCooperative:
             radii = reach + one.least
             if one.upright:
                 centres[..., 2] = own[..., 2]
-            _hold_where_caught(centres, own, radii)
+            _stop_before_own_plan(centres, own, radii)
             if one.upright:
                 centres[..., 2] = own[..., 2]
             found.append((centres, radii))
         return found
 
     def target(self, now: int, begins: int, view: View) -> list[tuple[Array, Array]]:
-        """Return the same for the target, where it is an obstacle, as seen at ``now`` (µs).
+        """Return centres and least distances, as ``balls`` does, for the target if it is an obstacle.
 
-        It is for the epoch that begins at ``begins`` (µs). The target is assumed to keep its motion, because
-        it is followed and not guarded against. One that falls silent stays where it was last.
+        ``view`` is that of ``now`` (µs); the epoch begins at ``begins`` (µs). The target is assumed to keep
+        its speed and turn rate; no ball grows about it. A target that falls silent stays at its last
+        extrapolated position.
         """
         if view.target_last is None or self._target is None:
             return []
@@ -108,8 +112,8 @@ class NonCooperative:
     def field(self, seen: list[NonCooperativeVehicle], own: Array, sensed: Axes | None = None) -> Array:
         """Return f (n, 3), m/s², after each step of the committed plan ``own`` (n, 3, 3): eqs. (9) and (10).
 
-        It is the field of those ``seen``, which keep their velocity until they are near, and of what is
-        ``sensed`` beside the plan's control points.
+        It is the field of the vehicles ``seen``, assumed to keep their velocity until they are near the plan,
+        and of the obstacles ``sensed`` near the plan's control points.
         """
         config = self._config
         if sensed is None:
@@ -119,27 +123,29 @@ class NonCooperative:
         knots = np.concatenate([own[:, 0], own[-1:, 2]])
         places = sensed.positions.reshape(-1, self._steps, 3, 3)
         there = np.concatenate([places[:, :, 0], places[:, -1:, 2]], axis=1)
-        least = self._exact + sensed.radius
+        least = self._least_distance + sensed.radius
         if seen:
-            fly = np.stack([one.position + (one.age + self._seconds)[:, None] * one.velocity for one in seen])
-            for place, one in zip(fly, seen, strict=True):
+            flown = np.stack(
+                [one.position + (one.age + self._seconds)[:, None] * one.velocity for one in seen]
+            )
+            for place, one in zip(flown, seen, strict=True):
                 if one.upright:
                     place[:, 2] = knots[:, 2]
             enough = np.array([one.least for one in seen])
-            _stop_when_near(fly, np.linalg.norm(knots - fly, axis=-1), enough)
-            there, least = np.concatenate([fly, there]), np.concatenate([enough, least])
+            _stop_when_near(flown, np.linalg.norm(knots - flown, axis=-1), enough)
+            there, least = np.concatenate([flown, there]), np.concatenate([enough, least])
         safe = least + config.field.d_safe - config.field.d_min
         obstacles = Obstacles(tuple(range(len(there))), there, least, safe)
-        clamp, dt = _NEAREST_COUNTS * config.limits.a_total, 1e-6 * config.certified.dt_us
+        clamp, dt = _MAX_FORCE_FACTOR * config.limits.a_total, 1e-6 * config.certified.dt_us
         force = repulsion(knots, obstacles, config.field.gain, clamp, config.field.braking, dt)
         return limit(force, config.limits.a_total)[1:]
 
 
-def _hold_where_caught(centres: Array, own: Array, radii: Array) -> None:
-    """Hold a ball from where it has grown over the plan, on the side that it came from.
+def _stop_before_own_plan(centres: Array, own: Array, radii: Array) -> None:
+    """Stop a ball before the first segment at which the own plan is inside it.
 
-    There nothing is guaranteed, whatever the plane. Beyond the vehicle the ball would keep it from flying
-    away.
+    From there on nothing can be guaranteed. A ball that moved on past the own plan would keep the vehicle
+    from flying away from it.
     """
     off = own - centres
     caught = (np.vecdot(off, off) < radii[:, None] ** 2).any(axis=1)
@@ -151,8 +157,8 @@ def _hold_where_caught(centres: Array, own: Array, radii: Array) -> None:
 def _stop_when_near(places: Array, distance: Array, least: Array) -> None:
     """Hold each of ``places`` (M, n, 3) where its ``distance`` (M, n) first reaches ``least`` (M,).
 
-    If it never does, hold it where the distance is smallest. A place that has passed through the vehicle
-    would drive it back into the way of what is yet to come.
+    If it never does, hold it where the distance is smallest. A place that had passed through the own plan
+    would repel the vehicle towards the approaching one.
     """
     for place, far, enough in zip(places, distance, least, strict=True):
         near = int(np.argmax(far <= enough)) if (far <= enough).any() else int(far.argmin())

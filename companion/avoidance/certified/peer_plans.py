@@ -1,11 +1,11 @@
 """Peers' committed plans, filed by the epoch at which they begin, and the coordination set.
 
 A vehicle replans in an epoch only if it holds the plan of that very epoch of every member of its coordination
-set, and each member counts it as a member in that epoch (``missing`` is empty). An older plan is not enough,
-because its sender may have made another since. A sender of a plan or a roster is a member from then on, and
-so are the members in its roster. A vehicle that said farewell flies its last plan to the end and stays there.
-A farewell is accepted only with the very plan that it goes with, because an older one may end elsewhere; and
-only for as long as plans are, because its sender may have joined again since.
+set, and each of these has this vehicle in its own coordination set (``missing`` is empty). An older plan is
+not enough, because its sender may have made another since. A sender of a plan or a roster is a member from
+then on, and so are the members in its roster. A vehicle that said farewell flies its last plan to the end and
+stays there. A farewell is accepted only if the plan of its epoch is held, because an older plan may end
+elsewhere; and only for as long as such a plan is accepted, because its sender may have joined again since.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.wire.plan import WirePlan, unpack
 from mavlink_bridge.wire.roster import Roster
 
-_KEPT = 4
-"""Epochs of a sender that are kept; nothing older or further ahead is accepted."""
+_MAX_EPOCHS = 4
+"""Number of epochs of a sender that are kept; plans further from now, older or ahead, are refused."""
 
 
 class StoredPlan(NamedTuple):
@@ -34,7 +34,7 @@ class StoredPlan(NamedTuple):
 def _read(payload: bytes) -> tuple[StoredPlan, bool]:
     """Return a received plan, and whether it ends at rest; raises PlanWireError.
 
-    Where many companions share a process, each payload is decoded once.
+    If many companions share a process, each payload is decoded once.
     """
     plan = unpack(payload)
     points = controls(plan)
@@ -57,10 +57,10 @@ class PeerPlans:
         self._steps, self._dt, self._epoch, self._origin = steps, dt, epoch, origin
         self._plans: dict[int, dict[int, StoredPlan]] = {}
         self._rosters: dict[int, Roster] = {}
-        # Epoch (µs) from which on each peer counts this vehicle, and the earliest epoch (µs) of rosters that
-        # show it.
+        # Epoch (µs) from which on each peer counts this vehicle, and the earliest epoch (µs) of rosters from
+        # which that is learnt.
         self._counted: dict[int, int] = {}
-        self._telling = 0
+        self._earliest_counted_epoch = 0
         self._left: dict[int, StoredPlan] = {}
         self._last: dict[int, bytes] = {}
         self._members: frozenset[int] | None = None
@@ -92,7 +92,7 @@ class PeerPlans:
             and plan.dt == self._dt
             and len(plan.accelerations) == self._steps
             and plan.epoch % self._epoch == 0
-            and abs(plan.epoch - now) <= _KEPT * self._epoch
+            and abs(plan.epoch - now) <= _MAX_EPOCHS * self._epoch
         )
         filed = self._plans.setdefault(system, {}) if fits else {}
         known = filed.get(plan.epoch)
@@ -104,7 +104,7 @@ class PeerPlans:
             self._members = None
         if known is None:
             filed[plan.epoch] = read
-            for epoch in sorted(filed)[:-_KEPT]:
+            for epoch in sorted(filed)[:-_MAX_EPOCHS]:
                 del filed[epoch]
 
     def receive_roster(self, now: int, system: int, roster: Roster) -> None:
@@ -116,9 +116,9 @@ class PeerPlans:
         """
         if system == self._own:
             return
-        if roster.epoch - now > _KEPT * self._epoch:
-            # The sender's clock is wrong and will be set right: its rosters from then on would be dated
-            # before this one.
+        if roster.epoch - now > _MAX_EPOCHS * self._epoch:
+            # The sender's clock is ahead. Once it is corrected, its rosters would have earlier epochs than
+            # this one and be ignored.
             self.refused += 1
             return
         last = self._rosters.get(system)
@@ -129,7 +129,7 @@ class PeerPlans:
             return
         if roster.farewell:
             filed = self._plans.get(system, {}).get(roster.epoch)
-            if filed is not None and 0 <= now - roster.epoch <= _KEPT * self._epoch:
+            if filed is not None and 0 <= now - roster.epoch <= _MAX_EPOCHS * self._epoch:
                 self._left[system] = filed
                 self._counted.pop(system, None)
                 self._members = None
@@ -137,7 +137,7 @@ class PeerPlans:
         self._left.pop(system, None)
         if self._own not in roster.members:
             self._counted.pop(system, None)
-        elif roster.epoch >= self._telling:
+        elif roster.epoch >= self._earliest_counted_epoch:
             self._counted.setdefault(system, roster.epoch)
         if last is None or left is not None or roster.members != last.members:
             self._members = None
@@ -146,19 +146,18 @@ class PeerPlans:
     def leave(self, epoch: int) -> None:
         """Record the own farewell with the own plan of ``epoch`` (µs).
 
-        A peer that accepts it no longer counts this vehicle. So no peer is assumed to count it until it
-        reports so at a time when it can no longer accept the farewell. A roster goes with a plan that begins
-        at most two epochs later.
+        A peer that accepts the farewell no longer counts this vehicle. So a peer is assumed to count it again
+        only after a roster of that peer says so and is too late for the peer to accept the farewell
+        afterwards. A roster goes with a plan that begins at most two epochs later.
         """
         self._counted.clear()
-        self._telling = epoch + (_KEPT + 3) * self._epoch
+        self._earliest_counted_epoch = epoch + (_MAX_EPOCHS + 3) * self._epoch
 
     def missing(self, epoch: int) -> set[int]:
         """Return the members that keep this vehicle from replanning in ``epoch`` (µs).
 
-        They are those whose plan of that epoch is not held, and those that may replan in it without counting
-        this vehicle. A member that first counts this vehicle with a later plan may have made that plan before
-        it did so.
+        The plan of such a member for this epoch is not held, or the member may replan without regard to this
+        vehicle, because it has sent no roster for this epoch or an earlier one that contains this vehicle.
         """
         found = set()
         for system in self.members:
@@ -168,7 +167,7 @@ class PeerPlans:
         return found
 
     def plans(self, epoch: int) -> dict[int, StoredPlan]:
-        """Return the plans of the present ``epoch`` (µs) by system id, of members and of those that left."""
+        """Return the plans of the present ``epoch`` (µs) by system id; departed vehicles are included."""
         found = {system: filed[epoch] for system, filed in self._plans.items() if epoch in filed}
         for system, last in self._left.items():
             plan = carried_on(last.plan, (epoch - last.plan.epoch) // self._dt)
@@ -177,5 +176,5 @@ class PeerPlans:
 
     @property
     def left(self) -> dict[int, StoredPlan]:
-        """Last plans of those that said farewell, by system id."""
+        """Last plans of the vehicles that said farewell, by system id."""
         return dict(self._left)

@@ -1,6 +1,7 @@
 """Profile of ArduCopter: GUIDED, arm, NAV_TAKEOFF above home, then set-points.
 
-The set-points have all five parts, with which it was measured to follow best.
+The set-points contain position, velocity, acceleration, yaw and yaw rate: in measurements, ArduCopter
+followed these best.
 """
 
 from __future__ import annotations

@@ -25,10 +25,10 @@ _CENTIDEGREE: Final = math.radians(0.01)
 class Limits:
     """Limits of an autopilot that follows set-points, horizontal except ``climb`` and ``sink``.
 
-    ``jerk`` (m/s³), ``acceleration`` (m/s²), ``speed`` (m/s), ``tilt`` (rad). ``position_gain`` and
-    ``velocity_gain`` (1/s): of the position and velocity loops. ``climb`` and ``sink`` (m/s): vertical
-    speeds, both positive. ``shaped``: jerk and acceleration are enforced on set-points; otherwise only speeds
-    and tilt are.
+    ``jerk`` (m/s³), ``acceleration`` (m/s²) and ``speed`` (m/s) bound norms; ``tilt`` (rad).
+    ``position_gain`` and ``velocity_gain`` (1/s): of the position and velocity loops. ``climb`` and ``sink``
+    (m/s): vertical speeds, both positive. ``shaped``: jerk and acceleration are enforced on set-points;
+    otherwise only speeds and tilt are.
     """
 
     jerk: float
@@ -190,7 +190,8 @@ _DECIDING: Final[Mapping[int, Mapping[str, tuple[str, ...]]]] = MappingProxyType
 def deciding(autopilot: int, parameters: Mapping[str, float], limit: str) -> tuple[str, float]:
     """Return name and value of the parameter that determines the field ``limit`` of ``limits_of``.
 
-    If there are several, it is the one that alone gives the nearest value.
+    If there are several, it is the one that gives the value nearest to the actual limit when all others are
+    stock.
     """
     actual = getattr(limits_of(autopilot, parameters), limit)
     stock = _STOCK[autopilot]

@@ -1,6 +1,6 @@
 """Profile of PX4: arm, take-off in AUTO, stream of set-points, then OFFBOARD.
 
-The altitude of the take-off is above mean sea level.
+The altitude of NAV_TAKEOFF is above mean sea level.
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ class Firmware(Protocol):
     stream_first: bool
     """Whether set-points count before GUIDED is entered, and can lift the vehicle off the ground in it."""
     stops: bool
-    """Whether a set-point in an unknown frame means *stop*; else it is refused."""
+    """Whether a set-point in an unknown frame means *stop*, else it is refused. True for ArduPilot only."""
     reports_ekf: bool
     """Whether EKF_STATUS_REPORT (193) is streamed."""
     echoes_yaw: bool
@@ -123,9 +123,9 @@ class Firmware(Protocol):
     after_loss: Mode
     """The mode after set-points have timed out."""
     coasting: float
-    """Time during which the filter keeps a position without GPS (s)."""
-    blind_patience: int
-    """Time in flight without a position after which it lands (µs)."""
+    """Time without GPS during which the filter reports a position (s)."""
+    position_loss_timeout_us: int
+    """Time in flight without a position after which the vehicle lands (µs)."""
     blind_text: str
     """STATUSTEXT (253) of that landing."""
 
@@ -135,7 +135,7 @@ class Firmware(Protocol):
     """Whether objections to arming are repeated without a request."""
     checks_mode: bool
     """Whether the pre-arm check (SYS_STATUS) requires a mode in which arming is allowed."""
-    battery_patience: int
+    battery_timeout_us: int
     """Time for which a battery must be low before it counts as low (µs)."""
     loiter: Mode
     """The mode that NAV_LOITER_UNLIM (17) enters."""
@@ -201,7 +201,7 @@ class Firmware(Protocol):
     def steering_refusal(self, status: Status) -> str | None:
         """Return the reason against following a good set-point now, or None.
 
-        An empty text means that it is ignored without a complaint.
+        An empty text means that the set-point is ignored without a complaint.
         """
         ...
 

@@ -89,13 +89,13 @@ class ArduPilot:
     after_loss = Mode.GUIDED
     # EKF3's posRetryTimeNoVel; then ten failures of the check that runs at 10 Hz.
     coasting = 7.0
-    blind_patience = 1_000_000
+    position_loss_timeout_us = 1_000_000
     blind_text = "EKF Failsafe: changed to LAND Mode"
     doubt_prefix = "PreArm: "
     repeats_doubts = True
     checks_mode = False
     # BATT_LOW_TIMER.
-    battery_patience = 10_000_000
+    battery_timeout_us = 10_000_000
     repositioning = Mode.GUIDED
     loiter = Mode.POSITION
 

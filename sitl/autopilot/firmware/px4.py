@@ -47,8 +47,8 @@ _NUMBERS: Final = {
 }
 _MODES: Final = {number: mode for mode, number in _NUMBERS.items() if mode is not Mode.STANDBY}
 _LOSS: Final = {"hold": Mode.HOLD, "land": Mode.LAND, "return": Mode.RETURN, "descend": Mode.POSITION}
-# Longest set-point interval (s): offboard needs more than 2 Hz.
-_SLOWEST: Final = 0.5
+# Longest set-point interval (s): offboard needs at least 2 Hz.
+_MAX_SETPOINT_INTERVAL: Final = 0.5
 
 
 class Px4:
@@ -78,12 +78,12 @@ class Px4:
     start_arms = True
     # EKF2_NOAID_TOUT.
     coasting = 5.0
-    blind_patience = 0
+    position_loss_timeout_us = 0
     blind_text = "Failsafe: no position, blind land"
     doubt_prefix = "Preflight Fail: "
     repeats_doubts = False
     checks_mode = True
-    battery_patience = 0
+    battery_timeout_us = 0
     repositioning = Mode.HOLD
     loiter = Mode.HOLD
 
@@ -135,7 +135,7 @@ class Px4:
 
     def mode_refusal(self, mode: Mode, status: Status) -> CommandRefusal | None:
         """Return the reason against entering ``mode`` now, or None."""
-        # Any mode can be chosen while disarmed; the stream is then checked at arming.
+        # While disarmed OFFBOARD can be chosen without a stream, which is then checked at arming.
         if mode is Mode.GUIDED and status.armed and not _streaming(status):
             return CommandRefusal(
                 mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "OFFBOARD needs set-points at more than 2 Hz"
@@ -162,7 +162,10 @@ class Px4:
     def takeoff(
         self, altitude: float, relative: bool | None, ground: float, status: Status, /
     ) -> Takeoff | CommandRefusal:
-        """Decide on NAV_TAKEOFF (22) to ``altitude`` (m above home if ``relative``, else above sea level)."""
+        """Decide on NAV_TAKEOFF (22) to ``altitude`` (m above home if ``relative``, else above sea level).
+
+        NaN means the default height; a takeoff in flight never descends.
+        """
         if not status.ready:
             return CommandRefusal(
                 mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Takeoff refused: no position estimate"
@@ -172,7 +175,7 @@ class Px4:
         height = altitude if relative else altitude - ground
         if not status.landed and not status.taking_off:
             height = height if height > status.height else status.height
-        # The height is at least the default, as with MIS_TAKEOFF_ALT.
+        # The height is at least the default, MIS_TAKEOFF_ALT, as on PX4.
         return Takeoff(height if height > self._takeoff_height else self._takeoff_height, Mode.TAKEOFF)
 
     def read(self, message: SetpointLocal, here: Pose) -> Reading:
@@ -218,7 +221,7 @@ class Px4:
 
 
 def _streaming(status: Status) -> bool:
-    return status.stream_age <= _SLOWEST and status.stream_gap <= _SLOWEST
+    return status.stream_age <= _MAX_SETPOINT_INTERVAL and status.stream_gap <= _MAX_SETPOINT_INTERVAL
 
 
 def _used(mask: int, shift: int) -> tuple[bool, bool, bool]:

@@ -68,9 +68,9 @@ _KNOWN: Final = {
     Type.RALLY: (mavlink.MAV_CMD_NAV_RALLY_POINT,),
 }
 
-_HIGHEST: Final = 10_000.0
-_LONGEST: Final = 86_400.0
-_FEWEST: Final = 3
+_MAX_ALTITUDE: Final = 10_000.0
+_MAX_WAIT_S: Final = 86_400.0
+_MIN_CORNERS: Final = 3
 
 
 class Item(NamedTuple):
@@ -86,7 +86,7 @@ class Item(NamedTuple):
 
     @property
     def here(self) -> bool:
-        """Whether it gives no place, and so means the vehicle's position."""
+        """Whether the item gives no place, and so means the vehicle's position."""
         return self.x == self.y == 0 or NOWHERE in (self.x, self.y)
 
 
@@ -120,7 +120,7 @@ def _mission_fault(item: Item) -> int:
     result: int = mavlink.MAV_MISSION_ACCEPTED
     if command not in FLOWN | _IMMEDIATE:
         result = mavlink.MAV_MISSION_UNSUPPORTED
-    elif command in PAUSING and not (math.isnan(first) or 0.0 <= first <= _LONGEST):
+    elif command in PAUSING and not (math.isnan(first) or 0.0 <= first <= _MAX_WAIT_S):
         result = mavlink.MAV_MISSION_INVALID_PARAM1
     elif (command == mavlink.MAV_CMD_DO_JUMP and not abs(second) <= 0x7FFF) or (
         command == mavlink.MAV_CMD_DO_CHANGE_SPEED and not (math.isnan(second) or abs(second) <= 1000.0)
@@ -137,7 +137,7 @@ def _area_fault(item: Item, of: Type) -> int:
     result: int
     if item.command not in _KNOWN[of]:
         result = mavlink.MAV_MISSION_UNSUPPORTED
-    elif (item.command in POLYGONS and not _FEWEST <= first <= 0xFFFF) or (
+    elif (item.command in POLYGONS and not _MIN_CORNERS <= first <= 0xFFFF) or (
         item.command in CIRCLES and not 0.0 < first < math.inf
     ):
         result = mavlink.MAV_MISSION_INVALID_PARAM1
@@ -157,6 +157,6 @@ def _place_fault(item: Item) -> int:
     elif placed and not on_globe(0, item.y):
         result = mavlink.MAV_MISSION_INVALID_PARAM6_Y
     # The height may be NaN only for a landing, which does not use it.
-    elif not abs(item.z) <= _HIGHEST and not (lands and math.isnan(item.z)):
+    elif not abs(item.z) <= _MAX_ALTITUDE and not (lands and math.isnan(item.z)):
         result = mavlink.MAV_MISSION_INVALID_PARAM7
     return result

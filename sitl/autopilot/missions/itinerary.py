@@ -1,8 +1,8 @@
 """Progress through a mission: the choice of the current item and its execution.
 
 Items that take time (NAV) are flown one after the other; those between them (DO) are executed on the way. The
-guidance moves the vehicle: a waypoint is a destination with a speed, and is passed when the estimate is near
-enough.
+guidance moves the vehicle: a waypoint is a destination with a speed, and is reached when the estimate is
+within the acceptance radius.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from sitl.estimation.sensors import Estimate
 from sitl.values.home import ABOVE_HOME, Home
 from sitl.values.origin import Origin
 
-# Distance (m) at which a height counts as reached.
-_LEVEL: Final = 0.3
+# Height error (m) within which a takeoff counts as completed.
+_HEIGHT_TOLERANCE: Final = 0.3
 # Distance (m) below which there is no bearing to turn to.
-_NEAR: Final = 1.0
+_MIN_BEARING_DISTANCE: Final = 1.0
 _FOR_EVER: Final = -1
-# Air and ground speed are equal, because plans ignore wind.
+# Air and ground speed are treated alike, because guidance ignores wind.
 _SPEEDS: Final = (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED)
 
 
@@ -118,7 +118,7 @@ class Itinerary:
         return flown[:1] == [mavlink.MAV_CMD_NAV_TAKEOFF]
 
     def rewind(self) -> None:
-        """Return to the beginning, at rest."""
+        """Return to the first item; the next ``advance`` begins it."""
         self.phase, self.current = Phase.IDLE, self._first
         self._speed = None
         self._jumps.clear()
@@ -172,7 +172,7 @@ class Itinerary:
     # Internals
 
     def _begin(self, here: Estimate) -> Event | None:
-        """Execute the immediate items, up to the next item that is flown."""
+        """Execute the immediate items and start the next item that is flown; FINISHED if there is none."""
         items = self._items
         # A plan of nothing but jumps would loop for ever.
         for _ in range(2 * len(items) + 1):
@@ -247,7 +247,7 @@ class Itinerary:
         return event
 
     def _is_high(self, here: Estimate) -> bool:
-        return abs(here.position[2] - self._target[2]) <= _LEVEL
+        return abs(here.position[2] - self._target[2]) <= _HEIGHT_TOLERANCE
 
     def _is_there(self, here: Estimate) -> bool:
         item = self._items[self.current]
@@ -298,4 +298,4 @@ class Itinerary:
         if self._px4 and math.isfinite(item.params[3]) and item.command != mavlink.MAV_CMD_NAV_LAND:
             return math.radians(item.params[3])
         north, east = self._target[0] - here.position[0], self._target[1] - here.position[1]
-        return math.atan2(east, north) if math.hypot(north, east) > _NEAR else None
+        return math.atan2(east, north) if math.hypot(north, east) > _MIN_BEARING_DISTANCE else None

@@ -33,7 +33,7 @@ from sitl.values.home import ABOVE_HOME, ABOVE_SEA
 CAPACITY: Final = 724
 """Greatest number of items of a plan, the capacity of ArduCopter's mission."""
 # Time after which a missing item is requested again (µs), and the limit of requests.
-_PATIENCE, _TRIES = 500_000, 10
+_RETRY_US, _MAX_TRIES = 500_000, 10
 _NEVER: Final = 1 << 62
 _KNOWN: Final = frozenset(int(of) for of in Type)
 
@@ -56,7 +56,7 @@ class Transfer:
 
     A plan takes effect when its last item has arrived and all are valid; an aborted upload leaves the old
     plan. ``next_due`` (µs): no ``work`` is due before it. ArduPilot requests items with MISSION_REQUEST (40),
-    and any form of item is an answer; PX4 requests with MISSION_REQUEST_INT (51).
+    PX4 with MISSION_REQUEST_INT (51); MISSION_ITEM_INT (73) or MISSION_ITEM (39) answers either request.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Transfer:
     # Upload
 
     def count(self, message: MissionCount, now: int) -> None:
-        """Handle MISSION_COUNT (44), the begin of an upload."""
+        """Handle MISSION_COUNT (44), the start of an upload."""
         of = self._known(message.source, message.mission_type)
         if of is None or self._is_busy(message.source, of):
             return
@@ -145,7 +145,7 @@ class Transfer:
         upload = self._upload
         if upload is None:
             self.next_due = _NEVER
-        elif upload.tries >= _TRIES:
+        elif upload.tries >= _MAX_TRIES:
             self._status_text.warn("Mission upload timed out")
             self._end(mavlink.MAV_MISSION_OPERATION_CANCELLED)
         else:
@@ -204,7 +204,7 @@ class Transfer:
         if upload is None:
             return
         upload.tries += 1
-        self.next_due = now + _PATIENCE
+        self.next_due = now + _RETRY_US
         ask = MissionRequest if self._asks_int else MissionRequestFloat
         seq = upload.first + len(upload.items)
         self._outbox.append(ask(self._source, seq, *upload.partner, upload.of))

@@ -23,7 +23,7 @@ HASH: Final = "_HASH_CHECK"
 """PX4's name for the hash of all names and values, which lets a client reuse a list that it has."""
 _NO_NUMBER: Final = 0xFFFF
 # A list is sent as ten messages (0.4 kB) every 10 ms: real links are slower, and no buffer overflows.
-_BURST, _PAUSE = 10, 10_000
+_BURST, _BURST_INTERVAL_US = 10, 10_000
 _NEVER: Final = 1 << 62
 
 
@@ -77,7 +77,7 @@ class ParameterProtocol:
             self._begin(now)
         first, self._next = self._next, min(self._next + _BURST, len(self._values))
         goes_on = self._next < len(self._values) or self._again
-        self.next_due = now + _PAUSE if goes_on else _NEVER
+        self.next_due = now + _BURST_INTERVAL_US if goes_on else _NEVER
         self._outbox += [self._value(number) for number in range(first, self._next)]
 
     def _begin(self, now: int) -> None:

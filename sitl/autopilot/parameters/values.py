@@ -15,7 +15,7 @@ _ALL_ONES: Final = 0xFFFFFFFF
 
 
 class Values:
-    """Values in the order of the table; those not ``saved`` come from the table and ``config``."""
+    """Values in the order of the table; values that are not ``saved`` come from ``config`` and the table."""
 
     def __init__(
         self, table: Sequence[Parameter], config: AutopilotConfig, saved: Mapping[str, float]

@@ -72,10 +72,10 @@ class PointMass:
         self.position: Vector = position
         self.velocity: Vector = ZERO
         self.acceleration: Vector = ZERO
-        self._asked = [0.0, 0.0]
+        self._requested_tilt = [0.0, 0.0]
         self._rate = [0.0, 0.0]
         self._tilt = [0.0, 0.0]
-        self._lift = 0.0
+        self._vertical_acceleration = 0.0
 
     def advance(self, wanted: Vector, wind: Vector, dt: float, drift: Vector = (0.0, 0.0, 0.0)) -> None:
         """Advance by ``dt`` seconds towards the acceleration ``wanted`` (m/s², without drag).
@@ -84,22 +84,24 @@ class PointMass:
         (m/s) more than the velocity indicates.
         """
         frame = self._airframe
-        share = -math.expm1(-dt / frame.angle_lag)
-        most = frame.angle_acceleration * dt
+        gain = -math.expm1(-dt / frame.angle_lag)
+        max_change = frame.angle_acceleration * dt
         for axis in (0, 1):
-            error = math.atan(wanted[axis] / GRAVITY) - self._asked[axis]
+            error = math.atan(wanted[axis] / GRAVITY) - self._requested_tilt[axis]
             change = error * frame.angle_rate - self._rate[axis]
-            self._rate[axis] += max(-most, min(most, change))
-            self._asked[axis] += self._rate[axis] * dt
-            self._tilt[axis] += share * (self._asked[axis] - self._tilt[axis])
-        self._lift += -math.expm1(-dt / frame.thrust_lag) * (wanted[2] - self._lift)
+            self._rate[axis] += max(-max_change, min(max_change, change))
+            self._requested_tilt[axis] += self._rate[axis] * dt
+            self._tilt[axis] += gain * (self._requested_tilt[axis] - self._tilt[axis])
+        self._vertical_acceleration += -math.expm1(-dt / frame.thrust_lag) * (
+            wanted[2] - self._vertical_acceleration
+        )
         north, east, down = (v - w for v, w in zip(self.velocity, wind, strict=True))
         drag, square = frame.drag, frame.square_drag
         self._integrate(
             (
                 GRAVITY * math.tan(self._tilt[0]) - (drag + square * abs(north)) * north,
                 GRAVITY * math.tan(self._tilt[1]) - (drag + square * abs(east)) * east,
-                self._lift - (drag * down if frame.vertical_drag else 0.0),
+                self._vertical_acceleration - (drag * down if frame.vertical_drag else 0.0),
             ),
             dt,
         )

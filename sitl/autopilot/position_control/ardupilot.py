@@ -64,11 +64,11 @@ class ArduPilotResponse:
         """Rest at ``position``, with the integral reset."""
         self._mass.restart(position)
         self._shaping.restart(position, ZERO, ZERO)
-        self._asked: Vector = ZERO
+        self._commanded: Vector = ZERO
         self._error: Pair = (0.0, 0.0)
-        self._slip: Pair | None = None
-        self._trend: Pair = (0.0, 0.0)
-        self._learnt: Pair = (0.0, 0.0)
+        self._velocity_error: Pair | None = None
+        self._velocity_error_rate: Pair = (0.0, 0.0)
+        self._integral: Pair = (0.0, 0.0)
         self._limited: Pair = (0.0, 0.0)
 
     def relocate(self, position: Vector, velocity: Vector) -> None:
@@ -83,17 +83,17 @@ class ArduPilotResponse:
         mass.position, mass.velocity = position, velocity
 
     def advance(self, wanted: Motion, dt: float, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
-        """Advance by ``dt`` seconds towards ``wanted``, which is valid at their end.
+        """Advance by ``dt`` seconds towards ``wanted``, which is valid at the end of the step.
 
-        ``wind`` (m/s) is the velocity of the air.
+        ``wind`` (m/s) is the velocity of the air; ``drift`` as for ``Response``.
         """
-        self._mass.advance(self._asked, wind, dt, drift)
-        slip = (0.0, 0.0) if self._slip is None else self._slip
-        self._shaping.advance(wanted, dt, self._limited, self._error, slip)
-        north, east = self._level(dt)
-        self._asked = (north, east, self._vertical())
+        self._mass.advance(self._commanded, wind, dt, drift)
+        velocity_error = (0.0, 0.0) if self._velocity_error is None else self._velocity_error
+        self._shaping.advance(wanted, dt, self._limited, self._error, velocity_error)
+        north, east = self._horizontal(dt)
+        self._commanded = (north, east, self._vertical())
 
-    def _level(self, dt: float) -> Pair:
+    def _horizontal(self, dt: float) -> Pair:
         gains, mass, shaping = self._gains, self._mass, self._shaping
         x, y, z = shaping.position
         error = x - mass.position[0], y - mass.position[1]
@@ -104,55 +104,57 @@ class ArduPilotResponse:
             place = mass.position[0] + near[0], mass.position[1] + near[1], z
             shaping.restart(place, shaping.velocity, shaping.acceleration)
         closing = directed(error, gains.position, gains.acceleration)
-        slip = (
+        velocity_error = (
             closing[0] + shaping.velocity[0] - mass.velocity[0],
             closing[1] + shaping.velocity[1] - mass.velocity[1],
         )
         self._error = error
-        self._filter(slip, dt)
-        self._learn(dt)
-        slip = self._slip or (0.0, 0.0)
+        self._filter(velocity_error, dt)
+        self._integrate(dt)
+        velocity_error = self._velocity_error or (0.0, 0.0)
         north, east = (
-            gains.velocity * slip[axis]
-            + self._learnt[axis]
-            + gains.derivative * self._trend[axis]
+            gains.velocity * velocity_error[axis]
+            + self._integral[axis]
+            + gains.derivative * self._velocity_error_rate[axis]
             + shaping.acceleration[axis]
             for axis in (0, 1)
         )
-        return self._leaned((north, east))
+        return self._limited_by_tilt((north, east))
 
-    def _filter(self, slip: Pair, dt: float) -> None:
+    def _filter(self, velocity_error: Pair, dt: float) -> None:
         """Filter the velocity error and its derivative, first order, both with the same frequency."""
-        if self._slip is None:
-            self._slip = slip
+        if self._velocity_error is None:
+            self._velocity_error = velocity_error
             return
         omega = 2.0 * math.pi * self._gains.filter_hz * dt
-        share = omega / (1.0 + omega)
-        old, trend = self._slip, self._trend
-        new = old[0] + share * (slip[0] - old[0]), old[1] + share * (slip[1] - old[1])
-        self._trend = (
-            trend[0] + share * ((new[0] - old[0]) / dt - trend[0]),
-            trend[1] + share * ((new[1] - old[1]) / dt - trend[1]),
+        gain = omega / (1.0 + omega)
+        old, error_rate = self._velocity_error, self._velocity_error_rate
+        new = old[0] + gain * (velocity_error[0] - old[0]), old[1] + gain * (velocity_error[1] - old[1])
+        self._velocity_error_rate = (
+            error_rate[0] + gain * ((new[0] - old[0]) / dt - error_rate[0]),
+            error_rate[1] + gain * ((new[1] - old[1]) / dt - error_rate[1]),
         )
-        self._slip = new
+        self._velocity_error = new
 
-    def _learn(self, dt: float) -> None:
-        """Update the integral; it does not grow in a direction in which the lean angle is at its limit."""
-        slip, before = self._slip or (0.0, 0.0), self._learnt
+    def _integrate(self, dt: float) -> None:
+        """Update the integral; while an error points to the lean limit, it cannot lengthen the integral."""
+        velocity_error, before = self._velocity_error or (0.0, 0.0), self._integral
         gain = self._gains.integral * dt
-        learnt = before[0] + gain * slip[0], before[1] + gain * slip[1]
-        self._learnt = cut(learnt, math.hypot(*before)) if same_way(slip, self._limited) else learnt
+        integral = before[0] + gain * velocity_error[0], before[1] + gain * velocity_error[1]
+        self._integral = (
+            cut(integral, math.hypot(*before)) if same_way(velocity_error, self._limited) else integral
+        )
 
-    def _leaned(self, acceleration: Pair) -> Pair:
+    def _limited_by_tilt(self, acceleration: Pair) -> Pair:
         """Limit the acceleration to ANGLE_MAX; the part across the desired velocity has priority."""
-        most = GRAVITY * math.tan(self._gains.tilt)
+        limit = GRAVITY * math.tan(self._gains.tilt)
         self._limited = (0.0, 0.0)
-        if math.hypot(*acceleration) <= most:
+        if math.hypot(*acceleration) <= limit:
             return acceleration
         self._limited = acceleration
         along, across, direction = split(acceleration, self._shaping.velocity[:2])
-        across = cut(across, most)
-        room = math.sqrt(max(most * most - across[0] ** 2 - across[1] ** 2, 0.0))
+        across = cut(across, limit)
+        room = math.sqrt(max(limit * limit - across[0] ** 2 - across[1] ** 2, 0.0))
         return joined(max(-room, min(room, along)), across, direction)
 
     def _vertical(self) -> float:
@@ -160,8 +162,8 @@ class ArduPilotResponse:
         error = shaping.position[2] - mass.position[2]
         closing = square_root_law(error, gains.position_z, gains.acceleration_z)
         closing = max(-speeds.up, min(speeds.down, closing))
-        slip = closing + shaping.velocity[2] - mass.velocity[2]
-        return gains.velocity_z * slip + shaping.acceleration[2]
+        velocity_error = closing + shaping.velocity[2] - mass.velocity[2]
+        return gains.velocity_z * velocity_error + shaping.acceleration[2]
 
 
 def _speeds(config: AutopilotConfig) -> Speeds:

@@ -28,7 +28,7 @@ from sitl.values.setpoints import ZERO
 
 _OVERSPEED: Final = 2.0
 """Gain with which vertical limits grow when the vertical speed limits are exceeded."""
-_CORNER: Final = math.sqrt(0.5)
+_MAX_CROSS_SHARE: Final = math.sqrt(0.5)
 """Share of the correction that may be across the wanted velocity, if most of it is along that velocity."""
 _NONE: Final = (0.0, 0.0)
 
@@ -49,19 +49,19 @@ class Shaping:
         """Continue from this motion."""
         self.position, self.velocity, self.acceleration = position, velocity, acceleration
 
-    def advance(self, wanted: Motion, dt: float, limited: Pair, error: Pair, slip: Pair) -> None:
-        """Advance by ``dt`` seconds towards ``wanted``, which is valid at their end.
+    def advance(self, wanted: Motion, dt: float, limited: Pair, error: Pair, velocity_error: Pair) -> None:
+        """Advance by ``dt`` seconds towards ``wanted``, which is valid at the end of the step.
 
-        ``limited``: the direction in which the lean angle is at its limit, zero if it is not; the trajectory
-        then does not run further away from a vehicle whose position ``error`` (m) and velocity error ``slip``
-        (m/s) point in that direction.
+        ``limited``: direction in which the lean angle is at its limit, else zero. At the limit the desired
+        position does not move on, and the desired velocity does not grow, in that direction if the position
+        ``error`` (m) or velocity error ``velocity_error`` (m/s), respectively, points in the same direction.
         """
-        self._move(dt, limited, error, slip)
+        self._move(dt, limited, error, velocity_error)
         (x, y, z), (u, v, w), (a, b, c) = wanted
-        north, east = self._level((x, y), (u, v), (a, b), dt)
+        north, east = self._horizontal((x, y), (u, v), (a, b), dt)
         self.acceleration = (north, east, self._vertical(z, w, c, dt))
 
-    def _move(self, dt: float, limited: Pair, error: Pair, slip: Pair) -> None:
+    def _move(self, dt: float, limited: Pair, error: Pair, velocity_error: Pair) -> None:
         (x, y, z), (u, v, w), (a, b, c) = self.position, self.velocity, self.acceleration
         half = 0.5 * dt * dt
         way = u * dt + a * half, v * dt + b * half
@@ -69,21 +69,25 @@ class Shaping:
         if limited != _NONE:
             if same_way(way, limited) and same_way(error, limited):
                 way = _NONE
-            if same_way(change, limited) and same_way(slip, limited) and not same_way((-u, -v), limited):
+            if (
+                same_way(change, limited)
+                and same_way(velocity_error, limited)
+                and not same_way((-u, -v), limited)
+            ):
                 change = _NONE
         self.position = (x + way[0], y + way[1], z + w * dt + c * half)
         self.velocity = (u + change[0], v + change[1], w + c * dt)
 
-    def _level(self, place: Pair, velocity: Pair, acceleration: Pair, dt: float) -> Pair:
+    def _horizontal(self, place: Pair, velocity: Pair, acceleration: Pair, dt: float) -> Pair:
         gains = self._gains
-        most, jerk = gains.acceleration, gains.jerk
+        limit, jerk = gains.acceleration, gains.jerk
         error = place[0] - self.position[0], place[1] - self.position[1]
-        closing = cut(directed(error, 0.5 * jerk / most, 0.5 * most, dt), self._speeds.level)
+        closing = cut(directed(error, 0.5 * jerk / limit, 0.5 * limit, dt), self._speeds.level)
         aim = closing[0] + velocity[0], closing[1] + velocity[1]
-        slip = aim[0] - self.velocity[0], aim[1] - self.velocity[1]
-        push = _corrected(directed(slip, jerk / most, jerk, dt), aim, most)
+        velocity_error = aim[0] - self.velocity[0], aim[1] - self.velocity[1]
+        correction = _corrected(directed(velocity_error, jerk / limit, jerk, dt), aim, limit)
         now = self.acceleration[:2]
-        change = push[0] + acceleration[0] - now[0], push[1] + acceleration[1] - now[1]
+        change = correction[0] + acceleration[0] - now[0], correction[1] + acceleration[1] - now[1]
         change = cut(change, jerk * dt)
         return now[0] + change[0], now[1] + change[1]
 
@@ -94,23 +98,23 @@ class Shaping:
             gain = _OVERSPEED * fast / speeds.down
         elif fast < -speeds.up:
             gain = -_OVERSPEED * fast / speeds.up
-        most, jerk = gains.acceleration_z * gain, gains.jerk_z * gain
-        aim = square_root_law(place - self.position[2], 0.5 * jerk / most, 0.5 * most, dt)
+        limit, jerk = gains.acceleration_z * gain, gains.jerk_z * gain
+        aim = square_root_law(place - self.position[2], 0.5 * jerk / limit, 0.5 * limit, dt)
         aim = max(-speeds.up, min(speeds.down, aim)) + velocity
-        push = square_root_law(aim - fast, jerk / most, jerk, dt)
-        push = max(-most, min(most, push)) + acceleration
-        change = push - self.acceleration[2]
+        correction = square_root_law(aim - fast, jerk / limit, jerk, dt)
+        correction = max(-limit, min(limit, correction)) + acceleration
+        change = correction - self.acceleration[2]
         return self.acceleration[2] + max(-jerk * dt, min(jerk * dt, change))
 
 
-def _corrected(push: Pair, aim: Pair, most: float) -> Pair:
-    """Limit a correcting acceleration to ``most``.
+def _corrected(correction: Pair, aim: Pair, limit: float) -> Pair:
+    """Limit a correcting acceleration to ``limit``.
 
-    The part across the wanted velocity ``aim`` keeps its share.
+    If it is mostly along the wanted velocity ``aim``, the part across has priority, up to √½ of ``limit``.
     """
-    along, across, direction = split(push, aim)
+    along, across, direction = split(correction, aim)
     if direction == _NONE or along * along <= across[0] ** 2 + across[1] ** 2:
-        return cut(push, most)
-    across = cut(across, _CORNER * most)
-    room = math.sqrt(max(most * most - across[0] ** 2 - across[1] ** 2, 0.0))
+        return cut(correction, limit)
+    across = cut(across, _MAX_CROSS_SHARE * limit)
+    room = math.sqrt(max(limit * limit - across[0] ** 2 - across[1] ** 2, 0.0))
     return joined(max(-room, min(room, along)), across, direction)

@@ -1,8 +1,7 @@
 """PX4 1.16's OFFBOARD position controller: set-point → position → velocity → tilt, without shaping.
 
-PX4 uses an offboard set-point as it is: it shapes no trajectory, and neither MPC_ACC_HOR nor MPC_JERK_MAX
-applies. The limits are those of tilt and speed, and the lag of the attitude. A set-point is constant between
-two messages.
+PX4 does not shape offboard set-points: neither MPC_ACC_HOR nor MPC_JERK_MAX applies, only the limits of speed
+and tilt, and the lag of the attitude. A set-point is constant between two messages.
 """
 
 from __future__ import annotations
@@ -43,19 +42,19 @@ class Px4Response:
     def restart(self, position: Vector) -> None:
         """Rest at ``position``, with the integrals reset."""
         self._mass.restart(position)
-        self._asked: Vector = ZERO
-        self._learnt: Vector = ZERO
-        self._speed: Vector = ZERO
-        self._change: Pair = (0.0, 0.0)
+        self._commanded: Vector = ZERO
+        self._integral: Vector = ZERO
+        self._previous_velocity: Vector = ZERO
+        self._acceleration: Pair = (0.0, 0.0)
 
     def relocate(self, position: Vector, velocity: Vector) -> None:
         """Handle a jump of the estimate to ``position`` and ``velocity``."""
         self._mass.position, self._mass.velocity = position, velocity
-        self._speed = velocity
+        self._previous_velocity = velocity
 
     def advance(self, wanted: Motion, dt: float, wind: Vector = ZERO, drift: Vector = ZERO) -> None:
-        """Advance by ``dt`` seconds towards ``wanted``, in air that moves with ``wind`` (m/s)."""
-        self._mass.advance(self._asked, wind, dt, drift)
+        """Advance by ``dt`` seconds towards ``wanted``; ``wind`` and ``drift`` (m/s) as for ``Response``."""
+        self._mass.advance(self._commanded, wind, dt, drift)
         gains, mass = self._gains, self._mass
         self._differentiate(dt)
         place, velocity, acceleration = wanted
@@ -67,50 +66,53 @@ class Px4Response:
         )
         aim = _within((closing[0], closing[1]), (velocity[0], velocity[1]), gains.speed)
         sink = max(-gains.speed_up, min(gains.speed_down, closing[2] + velocity[2]))
-        slip = aim[0] - mass.velocity[0], aim[1] - mass.velocity[1], sink - mass.velocity[2]
+        velocity_error = aim[0] - mass.velocity[0], aim[1] - mass.velocity[1], sink - mass.velocity[2]
         north, east = (
             acceleration[axis]
-            + gains.velocity * slip[axis]
-            + self._learnt[axis]
-            - gains.derivative * self._change[axis]
+            + gains.velocity * velocity_error[axis]
+            + self._integral[axis]
+            - gains.derivative * self._acceleration[axis]
             for axis in (0, 1)
         )
         tilted = cut((north, east), GRAVITY * math.tan(gains.tilt))
-        self._asked = (*tilted, acceleration[2] + gains.velocity_z * slip[2] + self._learnt[2])
-        self._learn(slip, (north - tilted[0], east - tilted[1]), dt)
+        self._commanded = (
+            *tilted,
+            acceleration[2] + gains.velocity_z * velocity_error[2] + self._integral[2],
+        )
+        self._integrate(velocity_error, (north - tilted[0], east - tilted[1]), dt)
 
     def _differentiate(self, dt: float) -> None:
         """Update the vehicle's acceleration by filtered differentiation of its velocity."""
-        share = dt / (dt + 1.0 / (2.0 * math.pi * self._gains.filter_hz))
+        gain = dt / (dt + 1.0 / (2.0 * math.pi * self._gains.filter_hz))
         u, v, _ = self._mass.velocity
-        before = self._change
-        self._change = (
-            before[0] + share * ((u - self._speed[0]) / dt - before[0]),
-            before[1] + share * ((v - self._speed[1]) / dt - before[1]),
+        before = self._acceleration
+        self._acceleration = (
+            before[0] + gain * ((u - self._previous_velocity[0]) / dt - before[0]),
+            before[1] + gain * ((v - self._previous_velocity[1]) / dt - before[1]),
         )
-        self._speed = self._mass.velocity
+        self._previous_velocity = self._mass.velocity
 
-    def _learn(self, slip: Vector, excess: Pair, dt: float) -> None:
+    def _integrate(self, velocity_error: Vector, excess: Pair, dt: float) -> None:
         """Update the integrals; acceleration that the tilt limit cut off is subtracted from them."""
         gains = self._gains
         back = 2.0 / gains.velocity
-        x, y, z = self._learnt
-        x += gains.integral * (slip[0] - back * excess[0]) * dt
-        y += gains.integral * (slip[1] - back * excess[1]) * dt
-        z += gains.integral_z * slip[2] * dt
-        self._learnt = (x, y, max(-GRAVITY, min(GRAVITY, z)))
+        x, y, z = self._integral
+        x += gains.integral * (velocity_error[0] - back * excess[0]) * dt
+        y += gains.integral * (velocity_error[1] - back * excess[1]) * dt
+        z += gains.integral_z * velocity_error[2] * dt
+        self._integral = (x, y, max(-GRAVITY, min(GRAVITY, z)))
 
 
-def _within(first: Pair, second: Pair, most: float) -> Pair:
-    """Return the sum of two velocities, limited to ``most``; ``second`` is shortened before ``first``."""
+def _within(first: Pair, second: Pair, limit: float) -> Pair:
+    """Return the sum of two velocities, limited to ``limit``; ``second`` is shortened before ``first``."""
     total = first[0] + second[0], first[1] + second[1]
-    if math.hypot(*total) <= most:
+    if math.hypot(*total) <= limit:
         return total
     size = math.hypot(*first)
-    if size >= most:
-        return cut(first, most)
+    if size >= limit:
+        return cut(first, limit)
     # |first + s·second| = most, 0 ≤ s < 1.
     square = second[0] ** 2 + second[1] ** 2
     half = first[0] * second[0] + first[1] * second[1]
-    s = (math.sqrt(half * half + square * (most * most - size * size)) - half) / square
+    s = (math.sqrt(half * half + square * (limit * limit - size * size)) - half) / square
     return first[0] + s * second[0], first[1] + s * second[1]

@@ -11,8 +11,8 @@ Pair = tuple[float, float]
 def square_root_law(error: float, gain: float, limit: float, dt: float = 0.0) -> float:
     """Return the rate that closes ``error`` by the square-root law.
 
-    It is proportional (``gain``, 1/s) near zero, and √(2·limit·(|e| − e₀/2)) beyond, so that the rate never
-    has to change faster than ``limit``. With ``dt`` (s) it never overshoots within one step.
+    The rate is proportional (``gain``, 1/s) to errors up to e₀ = limit/gain², and √(2·limit·(|e| − e₀/2))
+    beyond, so that it changes no faster than ``limit``. With ``dt`` (s) it never overshoots within one step.
     """
     near = limit / (gain * gain)
     size = abs(error)
@@ -38,12 +38,12 @@ def directed(error: Pair, gain: float, limit: float, dt: float = 0.0) -> Pair:
     return error[0] * factor, error[1] * factor
 
 
-def cut(vector: Pair, most: float) -> Pair:
-    """Return ``vector``, shortened to the length ``most``."""
+def cut(vector: Pair, limit: float) -> Pair:
+    """Return ``vector``, shortened to the length ``limit`` if it is longer."""
     size = math.hypot(*vector)
-    if size <= most:
+    if size <= limit:
         return vector
-    return vector[0] * most / size, vector[1] * most / size
+    return vector[0] * limit / size, vector[1] * limit / size
 
 
 def split(vector: Pair, along: Pair) -> tuple[float, Pair, Pair]:

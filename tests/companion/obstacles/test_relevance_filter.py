@@ -117,7 +117,7 @@ def test_of_whom_its_autopilot_tells_nobody_else_becomes_the_voice_unheard():
         listener.receive(now, lost, state._replace(source=Source(OTHER, 1)), plan)
         listener.look(now + PERIOD // 2)
         age = listener.world.neighbours.ages(now)[OTHER]
-        assert age <= listener.relevance._longest * 1e6 + PERIOD
+        assert age <= listener.relevance._max_age_s * 1e6 + PERIOD
     assert listener.decoded() < 3 * (END + 20 * PERIOD - NOW) // PERIOD
 
 
@@ -133,10 +133,10 @@ def planned(config, now, position, velocity, prediction, aim, obstacles):
 def test_who_is_ignored_can_act_on_no_plan_until_it_is_heard_again(config, direction, beyond, speed):
     """Not even if both make for each other as fast as they may from the moment that it was last heard."""
     fastest = hypot(*config.limits.v_max)
-    place = (Listener(config).relevance._certainly + beyond) * direction
+    place = (Listener(config).relevance._relevant_distance + beyond) * direction
     velocity = -speed * fastest * direction
     listener = after_seconds(place, velocity, config)
-    until = listener.relevance._until.get(OTHER, END)
+    until = listener.relevance._ignored_until.get(OTHER, END)
     if until == END:
         return
     assert until - END < 1_000_000

@@ -72,7 +72,7 @@ def test_the_forms(text: str, endpoint: Endpoint) -> None:
         ("tcp:::1:5760", "IPv6 in brackets"),
         ("tcpin:[127.0.0.1]:5760", "no IPv6 address"),
         ("tcp:[fe80::1%\n]:5760", "no IPv6 address"),
-        ("mcast:10.0.0.1:14550", "224.0.0.0 to 239.255.255.255"),
+        ("mcast:10.0.0.1:14550", "224.0.0.0…239.255.255.255"),
         ("mcast:group:14550", "no IPv4 address"),
         ("mcast:239.1.2.3:0", "outside 1…65535"),
         ("mcast:,lo", "127.0.0.1 stays on this machine"),

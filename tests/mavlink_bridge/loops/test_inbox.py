@@ -12,13 +12,15 @@ from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.links.endpoints import TcpIn
 from mavlink_bridge.links.link import memory_pair
 from mavlink_bridge.links.tcp import TcpListener
-from mavlink_bridge.loops.inbox import CAPACITY, FINGERS, HANDFUL, ROOM, Inbox
+from mavlink_bridge.loops.inbox import CAPACITY, MAX_STEP_BYTES, MAX_STEP_DATAGRAMS, ROOM, Inbox
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.framing import LONGEST_FRAME
 from tests.mavlink_bridge.link_pairs import HOST, frame, frames
 
-sizes = st.integers(1, 3000) | st.sampled_from([HANDFUL - 1, HANDFUL, HANDFUL + 1, 65507])
-many = st.integers(0, 3 * FINGERS).map(lambda count: [20] * count)
+sizes = st.integers(1, 3000) | st.sampled_from(
+    [MAX_STEP_BYTES - 1, MAX_STEP_BYTES, MAX_STEP_BYTES + 1, 65507]
+)
+many = st.integers(0, 3 * MAX_STEP_DATAGRAMS).map(lambda count: [20] * count)
 
 
 @given(st.lists(sizes, max_size=60) | many, st.lists(sizes, max_size=60) | many)
@@ -38,9 +40,11 @@ def test_all_comes_in_its_order_a_handful_of_each_link_at_a_time(one: list[int],
             left = sent[name][len(found[name]) :]
             assert part == left[: len(part)]
             # As much as fits into a handful, and one at least.
-            assert len(part) <= 1 or (sum(map(len, part)) <= HANDFUL and len(part) <= FINGERS)
-            if len(part) < min(len(left), FINGERS):
-                assert sum(map(len, part)) + len(left[len(part)]) > HANDFUL
+            assert len(part) <= 1 or (
+                sum(map(len, part)) <= MAX_STEP_BYTES and len(part) <= MAX_STEP_DATAGRAMS
+            )
+            if len(part) < min(len(left), MAX_STEP_DATAGRAMS):
+                assert sum(map(len, part)) + len(left[len(part)]) > MAX_STEP_BYTES
             assert part or not left
             found[name] += part
     assert inbox.take() == []
@@ -56,7 +60,7 @@ def test_a_flood_on_one_link_costs_the_others_nothing() -> None:
         far_too.send(bytes([number % 256]))
         taken = inbox.take()
         assert taken[-1] == Datagram("quiet", bytes([number % 256]))
-        assert len(taken) == HANDFUL // 1000 + 1
+        assert len(taken) == MAX_STEP_BYTES // 1000 + 1
     queue = inbox._queues[0]
     assert queue._bytes <= ROOM
     assert inbox.overruns > 0
@@ -95,12 +99,12 @@ def test_who_says_too_much_over_tcp_has_to_wait_and_loses_nothing() -> None:
                 refused += 1
                 with inbox._reading:
                     inbox._read()
-            assert inbox._queues[0]._bytes < HANDFUL + 8192 + LONGEST_FRAME
+            assert inbox._queues[0]._bytes < MAX_STEP_BYTES + 8192 + LONGEST_FRAME
         caller.setblocking(True)
         while len(found) < sent:
             found += frames([data for _, data in inbox.take()])
     assert found[:sent] == [frame(k, 120) for k in range(sent)]
     assert inbox.overruns == 0
-    assert sent * len(frame(0, 120)) > 10 * HANDFUL
+    assert sent * len(frame(0, 120)) > 10 * MAX_STEP_BYTES
     inbox.close()
     listener.close()

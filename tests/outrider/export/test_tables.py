@@ -186,8 +186,8 @@ def test_what_does_not_fit_into_memory_at_once_gives_the_same_rows(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(mavlink_tables, "_ROWS", 7)
-    monkeypatch.setattr(mavlink_tables, "_BYTES", 1000)
+    monkeypatch.setattr(mavlink_tables, "_PART_ROWS", 7)
+    monkeypatch.setattr(mavlink_tables, "_MAX_BUFFER_BYTES", 1000)
     export(run, "parquet", tmp_path / "parts", as_json=True)
     assert Counter(rows_of(tables(tmp_path / "parts"))) == Counter(rows_of(found))
     path = tmp_path / "parts" / "mavlink" / "11" / "LOCAL_POSITION_NED.parquet"

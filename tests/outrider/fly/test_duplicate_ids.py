@@ -30,7 +30,7 @@ from outrider.fly.status import StatusReports
 from outrider.fly.transmit_statistics import TransmitStatistics
 from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
 from outrider.supervision.duplicate_ids import REMEMBERED, DuplicateIds
-from outrider.supervision.supervised_node import CLOCK, TWIN, SupervisedNode
+from outrider.supervision.supervised_node import CLOCK, DUPLICATE, SupervisedNode
 from outrider.supervision.takeoff_inhibit import TakeoffInhibit
 from tests.companion.bench import FLEET, PROFILES, START, SYSTEM, TARGET, TICK, PerfectAutopilot
 
@@ -225,6 +225,6 @@ def test_no_go_is_taken_before_the_clock_is_known_nor_beside_a_twin() -> None:
     supervised = SupervisedNode(node, air.clock, None, None, air.duplicates)
     assert (supervised.barred, taken(supervised)) == ("", True)
     air.pass_by(5.0, OWN._replace())
-    assert (supervised.barred, taken(supervised)) == (TWIN, False)
+    assert (supervised.barred, taken(supervised)) == (DUPLICATE, False)
     air.pass_by(20.0)
     assert (supervised.barred, taken(supervised)) == ("", True)

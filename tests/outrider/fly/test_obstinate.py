@@ -19,7 +19,7 @@ from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.fly.child_process import FAREWELL, KILLED, ChildProcess
+from outrider.fly.child_process import EXIT_TIMEOUT_S, KILL_TIMEOUT_S, ChildProcess
 from outrider.fly.event_log import EventLog
 from outrider.fly.log import BATCH, MAX_BATCHES, Log
 from outrider.fly.terminal import Terminal
@@ -128,13 +128,13 @@ def test_a_process_that_cannot_be_killed_is_not_waited_for(
     monkeypatch.setattr(child, "_process", Stuck())
     child.kill()
     child.join()
-    assert done == ["killed", KILLED]
+    assert done == ["killed", KILL_TIMEOUT_S]
     # Nor where it had time to end by itself.
     done.clear()
     child = ChildProcess(cast(Worker, SimpleNamespace(main=None)))
     monkeypatch.setattr(child, "_process", Stuck())
     child.join()
-    assert done == [FAREWELL, "killed", KILLED]
+    assert done == [EXIT_TIMEOUT_S, "killed", KILL_TIMEOUT_S]
 
 
 def test_who_does_not_listen_ends_nothing(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from outrider.fly.process_channel import ALONE, Channel, OrderLink, intercom
+from outrider.fly.process_channel import PARENT_TIMEOUT_S, Channel, OrderLink, intercom
 from outrider.fly.watchdog import FIRST, HUNG, Watchdog
 
 LOOK = 0.05
@@ -59,7 +59,7 @@ def test_a_child_whose_parent_stands_still_is_alone(
         assert orders.receive() == []
         assert not orders.alone
         now += 0.1
-    now += ALONE - 1.0
+    now += PARENT_TIMEOUT_S - 1.0
     assert not orders.alone
     now += 2.0
     assert orders.alone

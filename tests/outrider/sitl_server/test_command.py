@@ -241,6 +241,6 @@ def test_who_opens_it_to_others_is_warned_and_it_ends_when_it_shall() -> None:
     assert len(out.splitlines()) == 1
     warning, *rest = err.splitlines()
     assert warning.startswith(f"outrider sitl: tcpin:0.0.0.0:{base}, ")
-    assert "unsigned MAVLink" in warning
+    assert "reachable from other machines" in warning
     assert rest
     assert all("vehicle 1" in line for line in rest)

@@ -31,7 +31,7 @@ from outrider.sitl_server.figures import factor
 from outrider.sitl_server.persistence import Persistence, prepare
 from outrider.sitl_server.request import Options, Request, checked
 from outrider.sitl_server.screen import Screen
-from outrider.sitl_server.shared_page import SAYINGS, Pace, SharedPage, VehicleSnapshot
+from outrider.sitl_server.shared_page import MAX_TEXTS, Pace, SharedPage, VehicleSnapshot
 from outrider.sitl_server.traffic import Traffic
 from outrider.sitl_server.vehicle_group import SPREAD, VehicleGroup, boot_times
 
@@ -235,14 +235,14 @@ def test_what_is_written_on_the_board_can_be_read_there(
     paces = [Pace(*time, 3, 2, 1, 0.5, 1.5, 7) for time in times]
     for index, one in enumerate(snapshot):
         board.show(index, one)
-        board.say(index, SAYINGS + index, f"{index} é")
+        board.say(index, MAX_TEXTS + index, f"{index} é")
     for group, pace in enumerate(paces):
         board.show_pace(group, pace)
         board.fail(group, "x" * 1000)
     board.stop = True
     assert [board.snapshot(index) for index in range(len(snapshot))] == snapshot
     assert board.paces() == paces
-    assert all(board.saying(index, SAYINGS + index) == f"{index} é" for index in range(len(snapshot)))
+    assert all(board.saying(index, MAX_TEXTS + index) == f"{index} é" for index in range(len(snapshot)))
     assert {len(board.fault(group)) for group in range(len(times))} == {255}
     assert board.stop
 
@@ -292,12 +292,12 @@ def test_what_happens_is_told_once() -> None:
     assert chronicle.look() == []
     board.show(1, VehicleSnapshot(up=True, custom_mode=4, time=2.0))
     assert chronicle.look() == []
-    for number in range(SAYINGS + 2):
+    for number in range(MAX_TEXTS + 2):
         board.say(1, number, f"text {number}")
-    board.show(1, VehicleSnapshot(True, True, 9, clients=2, said=SAYINGS + 2, time=12.5))
+    board.show(1, VehicleSnapshot(True, True, 9, clients=2, said=MAX_TEXTS + 2, time=12.5))
     lines = chronicle.look()
     assert [line.split("vehicle 4: ")[1] for line in lines] == [
-        *(f"says 'text {number}'" for number in range(2, SAYINGS + 2)),
+        *(f"says 'text {number}'" for number in range(2, MAX_TEXTS + 2)),
         "mode LAND",
         "armed",
         "2 clients",

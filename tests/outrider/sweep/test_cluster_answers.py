@@ -64,7 +64,7 @@ class Client:
 
 @pytest.fixture(autouse=True)
 def _quickly(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("_TICK_S", "_LOOK_S", "_FETCH_S"):
+    for name in ("_TICK_S", "_POLL_PERIOD_S", "_FETCH_TIMEOUT_S"):
         monkeypatch.setattr(cluster, name, 0.0)
 
 

@@ -15,7 +15,7 @@ from outrider.errors import InputError
 from outrider.resources import config_root
 from outrider.scenarios.places import FixedTarget, Points
 from outrider.scenarios.scenario import Scenario
-from outrider.sweep.draw import dials, draw, vehicles
+from outrider.sweep.draw import draw, scene_parameters, vehicles
 from outrider.sweep.scenes import DECIDED, Scene
 from outrider.yaml_files.yaml_file import load, read
 
@@ -120,7 +120,7 @@ def test_an_escort_s_circles_are_clear_and_its_jumps_as_long_as_it_says(
     which = scene("chase", vehicles=[count, count], difficulty=difficulty)
     flown = drawn(which, seed)
     assert isinstance(flown.target, FixedTarget)
-    wanted = dials(which, count, seed)
+    wanted = scene_parameters(which, count, seed)
     places = np.array([flown.target.at, *(jump.to for jump in flown.target.jumps)])
     assert len(flown.target.jumps) == wanted.jumps
     np.testing.assert_allclose(np.linalg.norm(np.diff(places, axis=0), axis=1), wanted.length, atol=2e-3)
@@ -146,7 +146,7 @@ def test_a_seed_is_one_scenario_and_another_seed_another(name: str, seed: int) -
 @given(SCENES, st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.integers(2, 200), SEEDS)
 def test_the_dial_turns_one_way(which: Scene, one: float, other: float, count: int, seed: int) -> None:
     easy, hard = (
-        dials(which.model_copy(update={"difficulty": difficulty}), count, seed)
+        scene_parameters(which.model_copy(update={"difficulty": difficulty}), count, seed)
         for difficulty in sorted((one, other))
     )
     assert hard.half <= easy.half
@@ -160,7 +160,7 @@ def test_the_dial_turns_one_way(which: Scene, one: float, other: float, count: i
 
 def test_numbers_in_all_are_drawn_evenly_whatever_the_dial() -> None:
     found = [
-        [dials(scene("posts", difficulty=difficulty), count, seed).posts for seed in range(700)]
+        [scene_parameters(scene("posts", difficulty=difficulty), count, seed).posts for seed in range(700)]
         for difficulty, count in ((0.0, 3), (1.0, 10))
     ]
     assert found[0] == found[1]
@@ -176,7 +176,7 @@ def test_the_dial_does_not_change_who_flies(difficulty: float, seed: int) -> Non
 
 def test_the_ends_of_the_dial_are_those_of_the_file() -> None:
     which = scene("chase")
-    easy, hard = (dials(which.model_copy(update={"difficulty": d}), 8, 1) for d in (0.0, 1.0))
+    easy, hard = (scene_parameters(which.model_copy(update={"difficulty": d}), 8, 1) for d in (0.0, 1.0))
     assert which.jumps is not None
     assert 100 * 8 / (2 * easy.half) ** 2 == pytest.approx(which.density.easy)
     assert 100 * 8 / (2 * hard.half) ** 2 == pytest.approx(which.density.hard)

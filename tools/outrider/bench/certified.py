@@ -1,4 +1,4 @@
-"""Certified plan step of ``outrider bench``: from peer plans and constraints to plan and set-point."""
+"""Certified plan step of ``outrider bench``: from received peer plans to plan and set-point."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SCENES = 60
 
 
 class Scene(NamedTuple):
-    """Vehicle in motion among eight neighbours that all matter, ready to plan."""
+    """Moving vehicle among eight neighbours within planning range, ready to plan."""
 
     flight: CertifiedFlight
     world: World
@@ -40,7 +40,7 @@ class Scene(NamedTuple):
 def plan_step(rounds: int) -> Array:
     """Return the CPU time (ms) of each plan step.
 
-    Raises RuntimeError if a scene is not solved: the figure would measure something else.
+    Raises RuntimeError if a plan is not solved, because its time would not be that of a full plan step.
     """
     scenario = load(find("scenarios", "antipodal-8"), Scenario)
     config = scenario.companion.model_copy(update={"avoidance": "certified", "turning_sense": "right"})

@@ -1,7 +1,7 @@
 """Command ``outrider bench``: speed of each part on this machine.
 
-Figures are CPU times, medians over rounds. Parts that are compared are interleaved, so that a machine that
-slows down slows all of them.
+Figures are CPU times, or rates by CPU time, as medians or percentiles over rounds. Compared parts are
+measured in turn, so that a temporary slow-down of the machine affects all of them.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _STEPS_A_CALL = 8
 
 
 class Scene(NamedTuple):
-    """One instant of a companion with eight neighbours that all matter, ready to plan."""
+    """One instant of a companion with eight neighbours, all within the reach of the field, ready to plan."""
 
     world: World
     position: np.ndarray
@@ -57,7 +57,7 @@ class Scene(NamedTuple):
 
 
 def measure(progress: Progress, *, quick: bool) -> dict[str, object]:
-    """Return all figures. ``quick`` leaves out the flights and takes fewer rounds."""
+    """Return all figures; with ``quick`` from fewer rounds and without flights."""
     rounds = 3 if quick else 9
     progress("plan step", 0.0)
     steps, piqp = plan_step(rounds)
@@ -89,7 +89,7 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
     """
     config = load(find("scenarios", "antipodal-8"), Scenario).companion
     scenes = [_scene(config, seed) for seed in range(60)]
-    # Each scene has its own planner, which stores its field and its gradient.
+    # Each scene has its own planner, because a planner keeps state between plans.
     planners = [Planner(config) for _ in scenes]
     headings = [Heading(config.heading, config.horizon) for _ in scenes]
     for scene, heading in zip(scenes, headings, strict=True):
@@ -209,13 +209,10 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
 
 
 def _all_act(obstacles: Obstacles) -> None:
-    """Check the figure's claim: all eight neighbours are there and within the reach of the field.
-
-    Raises RuntimeError if it does not hold.
-    """
+    """Raise RuntimeError unless all eight neighbours are present, at most 0.5 m beyond the field's reach."""
     distance = np.linalg.norm(obstacles.positions[:, 0] - (0.0, 0.0, 5.0), axis=1)
     if len(distance) != _NEIGHBOURS or distance.max() >= obstacles.d_safe.max() + 0.5:
-        raise RuntimeError("the benchmark's scene is not what it says")
+        raise RuntimeError("the benchmark's scene lacks a neighbour within the reach of the field")
 
 
 def _per_call(call: Callable[[], object], calls: int = 5_000) -> float:

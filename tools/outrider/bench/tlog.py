@@ -23,8 +23,9 @@ _SOURCE = Source(11, mavlink.MAV_COMP_ID_AUTOPILOT1)
 def reading(rounds: int) -> dict[str, float]:
     """Return messages per CPU-second on one core, medians over interleaved rounds.
 
-    The figures are those of the reader, of the census that ``replay --list`` takes, and of pymavlink's
-    mavlogfile, which always decodes messages too.
+    Measured are the reader (framing only), the census of ``replay --list``, and pymavlink's mavlogfile, which
+    also decodes every message; ``tlog_times_pymavlink`` is the ratio of the reader's rate to mavlogfile's.
+    Raises RuntimeError if a reader does not return all messages.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.tlog"
@@ -39,7 +40,7 @@ def reading(rounds: int) -> dict[str, float]:
             for name, read in ways.items():
                 started = time.process_time()
                 if read() != _FRAMES:
-                    raise RuntimeError("the benchmark's log is not what it says")
+                    raise RuntimeError("a reader did not return all messages of the benchmark's log")
                 rates[name].append(_FRAMES / (time.process_time() - started))
     figures = {name: round(float(np.median(values))) for name, values in rates.items()}
     ours, theirs = (np.array(rates[f"tlog_messages_per_s{of}"]) for of in ("", "_pymavlink"))

@@ -12,8 +12,8 @@ class Terms(NamedTuple):
 
     ``fleet``: system ids that share committed plans; ``apart``: those whose plans are not committed plans.
     ``dt`` and ``epoch`` in µs; ``steps``: knots of a plan; ``origin``: fingerprint of its frame;
-    ``required``: least distance (m) between two plans; ``a_max``: mm/s² on each axis; ``upright``: heights do
-    not count.
+    ``required``: least distance (m) between two plans; ``a_max``: mm/s² on each axis; ``upright``: distances
+    are horizontal.
     """
 
     fleet: tuple[int, ...]
@@ -50,7 +50,7 @@ class UnreadablePayloads(NamedTuple):
 
 
 class FarewellChange(NamedTuple):
-    """Change at ``time`` (µs): from then on the owner's rosters say farewell, or no longer do."""
+    """Change at ``time`` (µs): from then on the owner's rosters have the farewell flag, or lack it."""
 
     time: int
     farewell: bool

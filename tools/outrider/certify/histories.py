@@ -1,7 +1,7 @@
 """Plans of one vehicle, one for each epoch.
 
-What it sent is compared with what the others received, and each plan with the one before. A receiver refuses
-a plan that does not fit and relies on the one before, carried on; so does this module.
+The plans sent are compared with those that the others received, and each plan with the previous one. Like a
+receiver, this module refuses an invalid plan and relies on the previous one, carried on.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from companion.avoidance.certified.committed import carried_on, rests
 from mavlink_bridge.wire.plan import WirePlan, pack
 from outrider.certify.evidence import Finding, Log, LoggedPlan, Terms
 
-_FAR = 4
-"""Largest interval between the start of a plan and its reception (epochs).
+_MAX_RECEPTION_EPOCHS = 4
+"""Largest interval between a plan's epoch and its reception (epochs).
 
 Receivers refuse a plan beyond it.
 """
@@ -84,7 +84,7 @@ def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, li
             else:
                 findings.append(Finding(flaw[0], (system,), of_it[0].time, flaw[1]))
         if sound:
-            # Of several plans the one with most copies counts; on a tie the last one sent, which is flown.
+            # Among several plans the one with most copies counts; on a tie the last sent, which is flown.
             chosen.append(max(sound)[-1])
     leaves = () if own is None else tuple(_leaves(own, chosen))
     steps = tuple(_steps(chosen, leaves))
@@ -93,7 +93,7 @@ def history(system: int, terms: Terms, logs: Sequence[Log]) -> tuple[History, li
 
 
 def _disagreements(system: int, found: Sequence[LoggedPlan], *, logged: bool) -> list[Finding]:
-    """Return differences among the plans sent, and between those sent and received; all are of one epoch."""
+    """Return differences among the plans sent, and between those sent and received, of one epoch."""
     epoch = found[0].plan.epoch
     sent = list(dict.fromkeys(sighting.plan for sighting in found if sighting.owner == system))
     received = [sighting for sighting in found if sighting.owner != system and sighting.plan not in sent]
@@ -133,7 +133,7 @@ def _flaw(plan: WirePlan, terms: Terms, seen: Sequence[int]) -> tuple[str, str] 
         knots = f"{len(plan.accelerations)} knots of {plan.dt} µs from {plan.epoch} µs"
         fleet = f"the fleet's are {terms.steps} of {terms.dt} µs from k·{terms.epoch} µs"
         return "a plan on other knots", f"{knots}; {fleet}"
-    if min(abs(plan.epoch - time) for time in seen) > _FAR * terms.epoch:
+    if min(abs(plan.epoch - time) for time in seen) > _MAX_RECEPTION_EPOCHS * terms.epoch:
         return "a plan of another time", f"begins {1e-6 * (plan.epoch - seen[0]):.1f} s after it was told"
     return None
 
@@ -148,9 +148,9 @@ def _leaves(own: Log, plans: Sequence[WirePlan]) -> Iterable[Absence]:
 
 
 def _steps(plans: Sequence[WirePlan], leaves: Sequence[Absence]) -> Iterable[Step]:
-    """Yield the relation of each plan to the one before.
+    """Yield each plan with its relation to the previous one.
 
-    In a gap the one before goes on: no vehicle can have received another one.
+    In a gap the previous plan is carried on: no vehicle can have received another one.
     """
     back = {leave.back for leave in leaves}
     last: WirePlan | None = None

@@ -3,9 +3,9 @@
 They are computed from the hulls of the differences of the control points, so a bound also holds at all times
 between the knots.
 
-A pair has to stay as far apart as is required, or, if that is less, as the largest distance it has had so
-far. It begins with the distance it has. After an anchor the bound is suspended until later plans of the two
-are as far apart as is required.
+The bound of a pair is the smaller of the required distance and the pair's largest distance so far; the first
+distance only sets the bound. After an anchor the bound is suspended until plans of the two in a later epoch
+are at least the required distance apart.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Pairs(NamedTuple):
 
 
 class _Pair:
-    """Distance that two vehicles have to keep, from epoch to epoch."""
+    """Check of the distance between two vehicles' plans, from epoch to epoch."""
 
     def __init__(self, who: tuple[int, int], required: float) -> None:
         self._who, self._required = who, required

@@ -25,7 +25,7 @@ from outrider.scenarios.companion_settings import settings_of
 from outrider.scenarios.scenario import Scenario
 
 _ALLOWED = "allowed: what outrider swarm SCENARIO --avoidance certified --out leaves"
-_OFTEN = 4096
+_RECORDS_PER_REPORT = 4096
 """Number of records between two progress reports."""
 
 Watch = Callable[[str, float], None]
@@ -129,7 +129,7 @@ def _read(owner: int, path: Path, at: Callable[[int], None]) -> Log:
     reader, size = read_tlog(path), 0
     for number, record in enumerate(reader):
         size += 8 + len(record.frame)
-        if number % _OFTEN == 0:
+        if number % _RECORDS_PER_REPORT == 0:
             at(size)
         for message in codec.feed(record.frame):
             if isinstance(message, Tunnel):

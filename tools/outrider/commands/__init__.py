@@ -1,4 +1,4 @@
 """Definitions of the commands of ``outrider``: their options, and the module that runs each.
 
-Heavy imports wait until a command needs them.
+Each command imports its module only when it runs, so that ``--help`` is quick.
 """

@@ -15,7 +15,7 @@ def sweep(
     runs: Annotated[int | None, typer.Option(min=1, max=1_000_000, help="Seeds per cell.")] = None,
     jobs: Jobs = None,
     out: Begun = None,
-    wall_limit: Annotated[float, typer.Option(min=1.0, help="s of wall time for one run.")] = 1800.0,
+    wall_limit: Annotated[float, typer.Option(min=1.0, help="Maximum wall time of one run, s.")] = 1800.0,
     scheduler: Annotated[
         str | None,
         typer.Option(metavar="ADDRESS", help="Fly on the workers of a Dask scheduler: tcp://HOST:PORT."),
@@ -55,7 +55,7 @@ def paper(
 def gallery(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SCENARIO]...", help="Names of shipped scenarios; all without."),
+        typer.Argument(metavar="[SCENARIO]...", help="Names of shipped scenarios; by default all."),
     ] = None,
     jobs: Jobs = None,
     out: Begun = None,

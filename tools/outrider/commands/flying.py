@@ -1,4 +1,4 @@
-"""Commands that fly: own swarms, emulated vehicles, and a companion on any supported autopilot."""
+"""Commands that fly (swarm, sitl, fly) or check an endpoint for it (doctor)."""
 
 from __future__ import annotations
 
@@ -29,9 +29,11 @@ def swarm(
     avoidance: Annotated[str | None, typer.Option(help="field or certified.")] = None,
     planar: Annotated[bool, typer.Option("--planar", help="Fix the height, as the paper.")] = False,
     vehicles: Annotated[int | None, typer.Option(help="How many fly.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of jitter, phases and link faults.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of jitter, phases and link faults.")] = 1,
     loss: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Share of messages lost.")] = None,
-    delay_ms: Annotated[float | None, typer.Option(min=0.0, help="Of the swarm and target links.")] = None,
+    delay_ms: Annotated[
+        float | None, typer.Option(min=0.0, help="Delay of the swarm and target links, ms.")
+    ] = None,
     sensors: Annotated[str | None, typer.Option(help=SENSORS)] = None,
     wind: Wind = None,
     replan_hz: Annotated[float | None, typer.Option(help="Plans per second.")] = None,
@@ -85,7 +87,7 @@ def swarm(
         with progress(prepared.scenario.duration_s) as watch:
             pace = flying.Pace(real_time or realtime, realtime)
             summary = flying.fly(prepared, seed, directory, watch, pace, shown)
-        # Many vehicles leave a gigabyte of garbage, and their logs are read next.
+        # A flight of many vehicles leaves a gigabyte of garbage; free it before the logs are read.
         gc.collect()
         with share_progress() as reading:
             made = make(directory, reading)
@@ -127,15 +129,15 @@ def sitl(
     wind: Wind = None,
     spacing: Annotated[float, typer.Option(min=0.0, max=1000.0, help="m between vehicles.")] = 3.0,
     columns: Annotated[
-        int | None, typer.Option(min=1, max=254, help="Vehicles beside each other; if not said a square.")
+        int | None, typer.Option(min=1, max=254, help="Vehicles side by side; by default a square.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of sensors' noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the sensor noise.")] = 1,
     state: Annotated[
         Path | None,
         typer.Option(help="Directory where parameters and missions are kept."),
     ] = None,
     signing_key: SigningKey = None,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="End by itself after that.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so many s.")] = None,
     as_json: Annotated[
         bool,
         typer.Option("--json", help="One JSON object on standard output when all are up, one at the end."),
@@ -171,12 +173,12 @@ def doctor(
     ],
     system: Annotated[
         int | None,
-        typer.Option(min=1, max=255, help="System id of the vehicle; if not said, the lowest."),
+        typer.Option(min=1, max=255, help="System id of the vehicle; by default the lowest."),
     ] = None,
     seconds: Annotated[
         float,
         typer.Option(
-            min=1.0, max=600.0, help="Wait so long at most; longer only for why the pre-arm check fails."
+            min=1.0, max=600.0, help="Maximum wait, s; longer only for the reasons of a failed pre-arm check."
         ),
     ] = 15.0,
     key: Annotated[Path | None, typer.Option(help="Key file of a link that is signed.")] = None,
@@ -198,11 +200,15 @@ def fly(
     ],
     config: Annotated[str, typer.Option(help="A file, or ardupilot, px4.")],
     swarm: Annotated[str | None, typer.Option(help="Endpoint of the other companions.")] = None,
-    target: Annotated[str | None, typer.Option(help="Endpoint of the target; the swarm's.")] = None,
-    ground: Annotated[str | None, typer.Option(help="Endpoint of orders; the autopilot's.")] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Endpoint of the target; by default the swarm's.")
+    ] = None,
+    ground: Annotated[
+        str | None, typer.Option(help="Endpoint of orders; by default the autopilot's.")
+    ] = None,
     system: Annotated[
         int | None,
-        typer.Option(min=1, max=250, help="In place of the file's system id; each vehicle has another."),
+        typer.Option(min=1, max=250, help="In place of the file's system id; unique to each vehicle."),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Plan and say what would be sent; steer and arm nothing.")
@@ -211,7 +217,7 @@ def fly(
     signing_key: SigningKey = None,
     out: RunDirectory = None,
     as_json: AsJson = False,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="Hold and end after that.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="Hold and end after so many s.")] = None,
     go: Annotated[
         bool, typer.Option("--go", help="The operator's go, given as soon as all is ready: it takes off.")
     ] = False,

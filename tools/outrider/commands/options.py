@@ -13,10 +13,10 @@ PHYSICS: Final = "own or jsbsim."
 RESPONSE: Final = "exact: at its set-points; firmware: flown by the firmware's position controller."
 
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
-Begun = Annotated[Path | None, typer.Option(help="Directory; one begun is gone on with.")]
-Jobs = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores.")]
+Begun = Annotated[Path | None, typer.Option(help="Directory; what was begun there is continued.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Processes; by default the number of cores.")]
 RunDirectory = Annotated[Path | None, typer.Option(help="Run directory; new or empty.")]
 SigningKey = Annotated[
-    Path | None, typer.Option(help="Only what is signed with it counts; see outrider key.")
+    Path | None, typer.Option(help="Key file; only messages signed with it are accepted; see outrider key.")
 ]
 Wind = Annotated[str | None, typer.Option(help="m/s towards east, or EAST,NORTH[,UP].")]

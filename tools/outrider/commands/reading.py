@@ -25,7 +25,7 @@ def view(
         Path | None,
         typer.Option(help="Write the run as one file that plays anywhere, and end."),
     ] = None,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="End by itself after that.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so many s.")] = None,
 ) -> None:
     """Show vehicles in the browser in 3D: a recorded run, or a live flight, to which nothing is sent."""
     from outrider.view.command import Terms
@@ -43,10 +43,15 @@ def replay(
         bool, typer.Option("--list", help="Show who is in the log, and what is damaged.")
     ] = False,
     certify: Annotated[
-        bool, typer.Option("--certify", help="Check from the plans on the wire that all kept apart.")
+        bool,
+        typer.Option(
+            "--certify", help="Check from the transmitted plans that all vehicles kept their distance."
+        ),
     ] = False,
     own: Annotated[int | None, typer.Option(min=1, max=255, help="The own vehicle's system id.")] = None,
-    neighbours: Annotated[str | None, typer.Option(help="Their system ids, with commas.")] = None,
+    neighbours: Annotated[
+        str | None, typer.Option(help="The neighbours' system ids, separated by commas.")
+    ] = None,
     target: Annotated[int | None, typer.Option(min=1, max=255, help="The target's system id.")] = None,
     like: Annotated[str, typer.Option(help="Scenario whose companions' settings count.")] = "escort",
     speed: Annotated[float | None, typer.Option(min=0.01, max=1000.0, help="Times the log's own.")] = None,
@@ -93,7 +98,7 @@ def export(
 
 def report(
     run_dir: Annotated[Path, typer.Argument(help="What a flight left.")],
-    out: Annotated[Path | None, typer.Option(help="The page; RUN_DIR/report.html if not said.")] = None,
+    out: Annotated[Path | None, typer.Option(help="The page; by default RUN_DIR/report.html.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Make one HTML page of a run: summary, replay, charts, events and message loss. It needs no network."""

@@ -1,4 +1,4 @@
-"""Examination of a vehicle: takes frames of a link or a log, gives what an escort lacks there.
+"""Examination of a vehicle: takes frames of a link or a log, returns what may prevent or endanger an escort.
 
 The steps are frames → ``hearing`` (senders, messages, rates, last reception) → checks (findings) → verdict →
 ``page``, or JSON.

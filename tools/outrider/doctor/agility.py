@@ -20,14 +20,14 @@ from outrider.resources import find
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.yaml_files.yaml_file import load
 
-_FILES: Final = {mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot", mavlink.MAV_AUTOPILOT_PX4: "px4"}
-_SPEED: Final = 5.0
+_COMPANION_FILES: Final = {mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot", mavlink.MAV_AUTOPILOT_PX4: "px4"}
+_STOPPING_SPEED: Final = 5.0
 """Speed for which the stopping distance is given (m/s).
 
 It was v_max of the shipped companions at their first flights.
 """
-_LOWER: Final = 0.99
-"""Share of the stock value below which a limit counts as lower: float32 is not exact."""
+_LOWER_RATIO: Final = 0.99
+"""Ratio to the stock value below which a limit counts as lower: float32 is not exact."""
 
 
 class Demand(NamedTuple):
@@ -45,12 +45,12 @@ class Demand(NamedTuple):
 @lru_cache
 def shipped(autopilot: int) -> Demand:
     """Return the demand of the companion file that is shipped for a MAV_AUTOPILOT."""
-    limits = load(find("companions", _FILES[autopilot]), FlyConfig).companion.limits
+    limits = load(find("companions", _COMPANION_FILES[autopilot]), FlyConfig).companion.limits
     return Demand(max(limits.u_max[:2]), max(limits.v_max[:2]), limits.a_total)
 
 
 def agility(case: Case) -> Iterator[Finding]:
-    """Yield what the autopilot can follow, and each parameter that lowers this below stock."""
+    """Yield the limits that the autopilot can follow, and each parameter that lowers one below stock."""
     beat = case.vehicle.vehicle.heartbeat
     if case.profile is None or beat is None or beat.type not in ROTORCRAFT:
         return
@@ -68,7 +68,9 @@ def agility(case: Case) -> Iterator[Finding]:
             else "Read them in a ground station.",
         )
         return
-    yield summary(limits_of(case.autopilot, reported), shipped(case.autopilot), _FILES[case.autopilot])
+    yield summary(
+        limits_of(case.autopilot, reported), shipped(case.autopilot), _COMPANION_FILES[case.autopilot]
+    )
     for name, value in reported.items():
         yield from lowered(case.autopilot, name, value)
 
@@ -79,24 +81,24 @@ def summary(limits: Limits, demand: Demand, file: str) -> Finding:
         f"it follows up to {limits.acceleration:.3g} m/s², {limits.jerk:.3g} m/s³, {limits.speed:.3g} m/s "
         f"and {math.degrees(limits.tilt):.0f}° of tilt"
     )
-    stop = f"From {_SPEED:g} m/s it stops in {limits.stopping_distance(_SPEED):.1f} m."
+    stop = f"From {_STOPPING_SPEED:g} m/s it stops in {limits.stopping_distance(_STOPPING_SPEED):.1f} m."
     how = (
-        "Set-points that ask for more are followed late."
+        "Set-points beyond these limits are followed late."
         if limits.shaped
-        else "In OFFBOARD only speed and tilt are enforced; the rest is how its own modes fly."
+        else "In OFFBOARD only speed and tilt are enforced; the rest applies to its own modes."
     )
     more = []
-    if limits.usable_acceleration < _LOWER * demand.acceleration:
+    if limits.usable_acceleration < _LOWER_RATIO * demand.acceleration:
         more.append(f"{demand.acceleration:g} m/s² an axis, {demand.total:g} with its field")
-    if limits.speed < _LOWER * demand.speed:
+    if limits.speed < _LOWER_RATIO * demand.speed:
         more.append(f"{demand.speed:g} m/s")
     if not more:
         return Finding(what, Severity.OK, f"{how} {stop}")
     return Finding(
         what,
         Severity.WARNING,
-        f"The shipped file {file} asks for {' and '.join(more)}. {how} {stop} The vehicle is then not where "
-        "its plan is, and may come too near to others.",
+        f"The shipped file {file} asks for {' and '.join(more)}. {how} {stop} The vehicle then departs "
+        "from its plan, and may come too near to others.",
         "Raise the autopilot's limits where the vehicle allows it, or lower u_max, v_max and a_total in the "
         "companion's file.",
     )
@@ -115,30 +117,33 @@ def lowered(autopilot: int, name: str, value: float) -> Iterator[Finding]:
         f"{name} = {value:g}, stock is {usual:g}",
         Severity.WARNING,
         " ".join(costs),
-        f"Set {name} to {usual:g}, unless the vehicle needs it so; then lower the companion's limits too.",
+        f"Set {name} to {usual:g}; if the vehicle needs the lower value, lower the companion's limits too.",
     )
 
 
 def _costs(limits: Limits, stock: Limits) -> Iterator[str]:
-    ways = limits.stopping_distance(_SPEED), stock.stopping_distance(_SPEED)
-    if limits.usable_acceleration < _LOWER * stock.usable_acceleration or limits.jerk < _LOWER * stock.jerk:
+    ways = limits.stopping_distance(_STOPPING_SPEED), stock.stopping_distance(_STOPPING_SPEED)
+    if (
+        limits.usable_acceleration < _LOWER_RATIO * stock.usable_acceleration
+        or limits.jerk < _LOWER_RATIO * stock.jerk
+    ):
         yield (
-            f"It allows {limits.usable_acceleration:.3g} m/s² and {limits.jerk:.3g} m/s³: from {_SPEED:g} "
-            f"m/s it stops in {ways[0]:.1f} m, stock in {ways[1]:.1f} m."
+            f"It allows {limits.usable_acceleration:.3g} m/s² and {limits.jerk:.3g} m/s³: from "
+            f"{_STOPPING_SPEED:g} m/s it stops in {ways[0]:.1f} m, stock in {ways[1]:.1f} m."
         )
-    elif limits.tilt < _LOWER * stock.tilt:
+    elif limits.tilt < _LOWER_RATIO * stock.tilt:
         yield (
             f"{math.degrees(limits.tilt):.0f}° of tilt give {limits.tilt_acceleration:.1f} m/s² for wind and "
             f"motion together, stock {stock.tilt_acceleration:.1f} m/s²."
         )
-    if limits.speed < _LOWER * stock.speed:
+    if limits.speed < _LOWER_RATIO * stock.speed:
         yield f"It corrects its way with {limits.speed:.3g} m/s at most, stock {stock.speed:.3g} m/s."
     vertical, usual = min(limits.climb, limits.sink), min(stock.climb, stock.sink)
-    if vertical < _LOWER * usual:
+    if vertical < _LOWER_RATIO * usual:
         yield f"It climbs or sinks with {vertical:.3g} m/s at most, stock {usual:.3g} m/s."
-    if limits.position_gain < _LOWER * stock.position_gain:
+    if limits.position_gain < _LOWER_RATIO * stock.position_gain:
         yield _slower("A distance from the set-point", limits.position_gain, stock.position_gain)
-    if limits.velocity_gain < _LOWER * stock.velocity_gain:
+    if limits.velocity_gain < _LOWER_RATIO * stock.velocity_gain:
         yield _slower("A difference in velocity", limits.velocity_gain, stock.velocity_gain)
 
 

@@ -6,10 +6,10 @@ from typing import Final
 
 from mavlink_bridge.messages import Message
 
-_RESTART: Final = 1_000_000
-_LEAP: Final = 5_000_000
-_FASTEST: Final = 100
-"""Largest factor by which a simulation may be sped up; more is rare."""
+_MIN_RESTART_US: Final = 1_000_000
+_MIN_LEAP_US: Final = 5_000_000
+_MAX_SPEED_UP: Final = 100
+"""Assumed largest factor by which a simulation is faster than real time."""
 
 
 class BootClock:
@@ -17,7 +17,8 @@ class BootClock:
 
     ``restarts``: number of times the clock went back by more than a second. ``backward``: number of times,
     among ``stamps``, that it went back at all, or that two different messages had the same time. ``leaps``:
-    number of times it went ahead by far more than the time that passed.
+    number of times it went ahead by more than 5 s plus 100 times the time that passed. Each message is
+    compared with the previous one of its type.
     """
 
     def __init__(self) -> None:
@@ -33,7 +34,7 @@ class BootClock:
         before = self._before.get(kind)
         if before is not None:
             passed, gone = now - before[0], boot - before[1]
-            restarted, leapt = gone < -_RESTART, gone > _LEAP + _FASTEST * passed
+            restarted, leapt = gone < -_MIN_RESTART_US, gone > _MIN_LEAP_US + _MAX_SPEED_UP * passed
             self.backward += gone < 0 or (gone == 0 and message != before[2])
             self.restarts += restarted
             self.leaps += leapt
@@ -48,14 +49,14 @@ class BootClock:
 
     @property
     def seconds(self) -> float:
-        """Time without a step (s of the receiver's clock)."""
+        """Time since the last restart or leap (s of the receiver's clock)."""
         return 0.0 if self._start is None else (self._end[0] - self._start[0]) * 1e-6
 
     @property
     def rate(self) -> float | None:
-        """Rate of the clock since its last step: its seconds per second of the receiver's.
+        """Rate of the clock since its last restart or leap: its seconds per second of the receiver's.
 
-        None if the time is too short to tell.
+        None below 1 s, and for a rate that is not positive.
         """
         if self._start is None or self.seconds < 1.0:
             return None
@@ -64,5 +65,5 @@ class BootClock:
 
     @property
     def doubled(self) -> bool:
-        """Whether the stamps come from two clocks: they go back and ahead again and again."""
+        """Whether the stamps come from two clocks: ``backward`` is at least five, and 2 % of ``stamps``."""
         return self.backward >= 5 and self.backward >= 0.02 * self.stamps

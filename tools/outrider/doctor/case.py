@@ -14,8 +14,8 @@ from outrider.doctor.sender_record import SenderRecord
 class Case(NamedTuple):
     """One vehicle on one link.
 
-    ``log``: it is a recording, so missing messages could not be requested. ``me``: sender id of the doctor,
-    None if it sends nothing. ``baud``: of a serial port.
+    ``log``: the link is a recording, so missing messages could not be requested. ``me``: sender id of the
+    doctor, None if the doctor sends nothing. ``baud``: baud rate of a serial port, None for other links.
     """
 
     hearing: Hearing
@@ -41,7 +41,7 @@ class Case(NamedTuple):
         return self.vehicle.is_px4
 
     def parameter(self, name: str) -> float | None:
-        """Return the value of a parameter, None if it was not received or is no number."""
+        """Return the value of a parameter, None if it was not received or is no number (not finite)."""
         message: ParamValue | None = self.vehicle.parameters.get(name)
         return None if message is None else number_of(message, bytewise=self.px4)
 
@@ -53,7 +53,8 @@ class Case(NamedTuple):
     def silent_for(self, message_id: int) -> float:
         """Return the time (s) from the last message of that id to the end.
 
-        In a log the end is the vehicle's last message. Without such a message it is the whole duration.
+        In a log, the end is the time of the vehicle's last message. Without a message of that id, return the
+        whole duration.
         """
         stream = self.vehicle.streams.get(message_id)
         end = self.vehicle.last if self.log else self.hearing.end

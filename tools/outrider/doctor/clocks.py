@@ -1,4 +1,4 @@
-"""Comparison of the vehicle's clock with this machine's."""
+"""Comparison of the vehicle's clock with the receiver's."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from mavlink_bridge.messages import SystemTime
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 
-_RIGHT, _JITTER = 0.005, 0.1
-"""Tolerance of the rate: a share, and an error (s) over the duration, as messages are late by that much."""
-_SIMULATED: Final = 0.2
+_RATE_TOLERANCE, _JITTER_S = 0.005, 0.1
+"""Tolerance of the rate: a ratio, and the jitter of the messages' delay (s), divided by the duration."""
+_MAX_SLIGHT_DEVIATION: Final = 0.2
+"""Deviation of the rate from 1 at which it counts as a simulation not in real time."""
 
 
 def clock(case: Case) -> Iterator[Finding]:
@@ -30,35 +31,37 @@ def clock(case: Case) -> Iterator[Finding]:
         yield Finding(
             f"its clock jumped ahead, {ticking.leaps} times",
             Severity.WARNING,
-            "Positions are dated by it: they look younger or older than they are.",
-            "Find out what sets it; sleeping computers of simulations do.",
+            "Positions have its time stamps: they appear newer or older than they are.",
+            "Find the cause; in a simulation, for example, the computer slept.",
         )
     rate = ticking.rate
     if rate is None:
         if not ticking.stamps:
             yield Finding(
-                "nothing that it says has a time",
+                "none of its messages has a time stamp",
                 Severity.WARNING,
-                "Positions cannot be dated.",
-                "Ask for ATTITUDE.",
+                "The age of its positions is unknown.",
+                "Request ATTITUDE.",
             )
         return
     what = f"its clock runs {rate:.3f} times as fast as here"
-    if abs(rate - 1.0) <= _RIGHT + _JITTER / ticking.seconds:
+    if abs(rate - 1.0) <= _RATE_TOLERANCE + _JITTER_S / ticking.seconds:
         yield Finding(what, Severity.OK, "Its seconds are ours.")
-    elif abs(rate - 1.0) < _SIMULATED:
+    elif abs(rate - 1.0) < _MAX_SLIGHT_DEVIATION:
         yield Finding(
             what,
             Severity.NOTE,
-            "A simulation that does not quite keep up, or a poor clock; companions live by its time.",
+            "A simulation slightly off real time, or a poor clock; companions use its time.",
         )
     else:
         yield Finding(
             what,
             Severity.NOTE,
-            "A simulation at a speed of its own. Rates here are in its time; companions live by it too.",
-            "Expect as many more messages a second, and see that the computer keeps up.",
+            "A simulation not in real time. The rates given here are in its time; companions use it too.",
+            "Expect message rates in that ratio, and see that the computer keeps up.",
         )
     unix = case.vehicle.latest(SystemTime)
     if unix is not None and not unix.unix_time:
-        yield Finding("it does not know the date", Severity.NOTE, "It learns it from GPS; signing wants it.")
+        yield Finding(
+            "it does not know the date", Severity.NOTE, "It gets the date from GPS; signing needs it."
+        )

@@ -26,23 +26,23 @@ from outrider.logs.timeline import on_one_line
 from outrider.terminal.share_progress import share_progress
 
 READY, NOT_READY = 0, 1
-_STEP: Final = 20_000
+_POLL_INTERVAL_US: Final = 20_000
 """Time between two polls of the link (µs)."""
-_OFTEN: Final = 4096
+_RECORDS_PER_REPORT: Final = 4096
 """Number of records between two progress reports."""
 
 
 def doctor(endpoint: str, system: int | None, seconds: float, key: Path | None, as_json: bool) -> int:
-    """Examine the vehicle at ``endpoint``, for ``seconds`` at most, and return the exit status.
+    """Examine the vehicle at ``endpoint``, print the verdict, and return the exit status.
 
-    ``key``: key file, None without one. Raises InputError for an endpoint that is invalid or cannot be
-    opened, and for an invalid key.
+    It takes ``seconds`` at most, longer only for the reasons of a failing pre-arm check. ``key``: key file or
+    None. Raises InputError for an endpoint or log that is invalid or cannot be opened, and an invalid key.
     """
     try:
         place = parse_endpoint(endpoint)
         if isinstance(place, Replay):
             if key is not None:
-                raise InputError(f"doctor {endpoint}: --key is for live links; a log is not asked anything")
+                raise InputError(f"doctor {endpoint}: --key is for live links; a log cannot be queried")
             verdict = of_log(place, system)
         else:
             verdict = _of_link(place, system, seconds, key)
@@ -69,7 +69,7 @@ def of_log(place: Replay, system: int | None) -> Verdict:
             frame = frame_at(data, 0)
             if isinstance(frame, Frame):
                 hearing.receive(time, frame)
-            if number % _OFTEN == 0:
+            if number % _RECORDS_PER_REPORT == 0:
                 watch(path.name, reader.bytes_read / size)
     hearing.bad, hearing.skipped_bytes = reader.report.bad, reader.report.skipped_bytes
     if not hearing.frames:
@@ -94,6 +94,6 @@ def consult(link: Link, clock: Clock, consultation: Consultation) -> Verdict:
             for data in consultation.step(now, link.receive()):
                 link.send(data)
             watch(consultation.doing(now), consultation.share(now))
-            clock.wait_until(now + _STEP)
+            clock.wait_until(now + _POLL_INTERVAL_US)
             now = clock.now()
     return consultation.examination.verdict()

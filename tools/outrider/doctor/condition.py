@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-_BRIEF: Final = 1.0
+_MIN_REPORTED_S: Final = 1.0
 """Shortest time worth reporting (s)."""
 
 
 class Condition:
-    """Condition over time.
+    """Durations and changes of a condition.
 
     ``holds``: its latest value, None before the first; ``lost``: number of times it was true and then became
     false.
@@ -29,8 +29,8 @@ class Condition:
 
     @property
     def history(self) -> str:
-        """Sentence on the times at which the condition was false; empty if they are negligible."""
-        if self.missing < _BRIEF:
+        """Sentence on the time for which the condition was false; empty if less than 1 s."""
+        if self.missing < _MIN_REPORTED_S:
             return ""
         times = f", and it was lost {self.lost} times" if self.lost > 1 else ", and it was lost once"
         return f" For {self.missing:.0f} s it was not so{times if self.lost else ', to begin with'}."

@@ -12,14 +12,14 @@ from outrider.doctor.examination import Examination
 from outrider.doctor.px4_events import genuine
 from outrider.doctor.questions import Questions
 
-_LONG_ENOUGH: Final = 5_000_000
+_MIN_DURATION_US: Final = 5_000_000
 """Time of reception that suffices for rates and a clock (µs)."""
 
 
 class Consultation:
     """Examination of the autopilot ``system`` (None: the lowest id), for ``limit`` µs at most.
 
-    It lasts longer only where a pre-arm check fails whose reasons have not been reported yet. With
+    It lasts longer only to wait for the reasons of a failing pre-arm check. With
     ``signing`` it signs its requests and accepts signed frames only; the times must then be Unix time.
     """
 
@@ -55,7 +55,7 @@ class Consultation:
         if self._start is None or self._questions.listening(now):
             return False
         passed = now - self._start
-        return passed >= self._limit or (passed >= _LONG_ENOUGH and self._questions.done(now))
+        return passed >= self._limit or (passed >= _MIN_DURATION_US and self._questions.done(now))
 
     def share(self, now: int) -> float:
         """Return the share of the longest duration that has passed, 0…1."""

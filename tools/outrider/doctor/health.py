@@ -17,7 +17,7 @@ _SENSORS: Final = {
     for number, entry in mavlink.enums["MAV_SYS_STATUS_SENSOR"].items()
     if entry.name.startswith(_PREFIX) and number != mavlink.MAV_SYS_STATUS_PREARM_CHECK
 }
-_LOW, _EMPTY = 0.3, 0.15
+_LOW_CHARGE, _EMPTY_CHARGE = 0.3, 0.15
 
 
 def checks(case: Case) -> Iterator[Finding]:
@@ -78,7 +78,7 @@ def battery(case: Case) -> Iterator[Finding]:
     if remaining is None and status is not None:
         remaining = status.battery_remaining
     low_voltage = case.parameter("BATT_LOW_VOLT") or 0.0
-    empty = max(case.parameter("BAT_LOW_THR") or 0.0, _EMPTY)
+    empty = max(case.parameter("BAT_LOW_THR") or 0.0, _EMPTY_CHARGE)
     volts = f", {voltage:.1f} V" if voltage else ""
     if voltage and voltage < low_voltage:
         yield Finding(
@@ -101,7 +101,7 @@ def battery(case: Case) -> Iterator[Finding]:
             f"That is what the autopilot takes for low ({empty:.0%}): its failsafe is next.",
             "Put a charged battery in.",
         )
-    elif remaining <= _LOW:
+    elif remaining <= _LOW_CHARGE:
         yield Finding(
             f"battery: {remaining:.0%}{volts}",
             Severity.WARNING,

@@ -53,7 +53,7 @@ class Hearing:
         sender.tell(now, frame, None if row is None else row.parse(source, frame.payload))
 
     def wait(self, now: int) -> int:
-        """Advance the time to ``now`` (µs), with or without a frame; return the time that counts."""
+        """Advance the time to ``now`` (µs) without a frame; return the latest time so far (µs)."""
         self.begin = now if self.begin is None else self.begin
         self.end = max(self.end, now)
         return self.end
@@ -69,9 +69,10 @@ class Hearing:
         return [self.senders[source] for source in sorted(self.senders) if self.senders[source].is_autopilot]
 
     def vehicle(self, system: int | None = None, *, lowest: bool = False) -> SenderRecord | None:
-        """Return the autopilot of ``system``, or the one with the most messages.
+        """Return the autopilot of ``system`` (None: any), or None if there is none.
 
-        ``lowest`` selects the lowest id instead, which does not change while messages arrive.
+        Among several, system ids above 0 and component 1 have priority, then the most messages. ``lowest``
+        selects the lowest id instead, which message counts do not affect.
         """
         found = [one for one in self.autopilots if system is None or one.source.system == system]
         return max(

@@ -13,9 +13,9 @@ from outrider.doctor.finding import Finding, Severity
 from outrider.logs.flight_modes import ROTORCRAFT, mode_of
 from outrider.logs.words import enumerated
 
-_TRIED: Final = {mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: (4, 6), mavlink.MAV_AUTOPILOT_PX4: (1, 16)}
+_MEASURED_VERSIONS: Final = {mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: (4, 6), mavlink.MAV_AUTOPILOT_PX4: (1, 16)}
 _TAKES_SETPOINTS: Final = mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-_SILENT: Final = 5.0
+_MAX_SILENCE_S: Final = 5.0
 _STARTING: Final = (mavlink.MAV_STATE_BOOT, mavlink.MAV_STATE_CALIBRATING)
 
 
@@ -30,7 +30,7 @@ def firmware(case: Case) -> Iterator[Finding]:
         yield Finding(
             f"an autopilot that is not known: {name} ({beat.autopilot}), {kind}",
             Severity.BLOCKING,
-            "How to arm it, and which set-points it takes, is known of ArduPilot (3) and PX4 (12) only.",
+            "A companion can arm and steer ArduPilot (3) and PX4 (12) only.",
             "Use ArduCopter or PX4.",
         )
         return
@@ -52,7 +52,7 @@ def _version(case: Case, kind: str) -> Iterator[Finding]:
         yield Finding(
             f"{name}, {kind}; its version is not told (AUTOPILOT_VERSION)",
             Severity.NOTE if case.log else Severity.WARNING,
-            "What was measured of ArduCopter 4.6 and PX4 1.16 may not hold for it.",
+            "The measurements with ArduCopter 4.6 and PX4 1.16 may not hold for it.",
             "Nobody asked for it in this log."
             if case.log
             else "See that REQUEST_MESSAGE reaches it; an old firmware: update it.",
@@ -60,7 +60,7 @@ def _version(case: Case, kind: str) -> Iterator[Finding]:
         return
     major, minor, patch, _ = reported.flight_version.to_bytes(4, "big")
     what = f"{name} {major}.{minor}.{patch}, {kind}, system {case.vehicle.source.system}"
-    tried = _TRIED[case.autopilot]
+    tried = _MEASURED_VERSIONS[case.autopilot]
     if (major, minor) == tried:
         yield Finding(what, Severity.OK, "This version has been measured.")
     elif (major, minor) < tried:
@@ -82,7 +82,7 @@ def _version(case: Case, kind: str) -> Iterator[Finding]:
         yield Finding(
             "it says that it takes no SET_POSITION_TARGET_LOCAL_NED",
             Severity.BLOCKING,
-            "An escort steers by nothing else.",
+            "An escort sends no other set-points.",
             "Use a build that takes it: ArduCopter with GUIDED, PX4 with OFFBOARD.",
         )
 
@@ -94,7 +94,7 @@ def dialect(case: Case) -> Iterator[Finding]:
         yield Finding(
             "it speaks MAVLink 1",
             Severity.WARNING,
-            "Nothing can be signed, and messages above 255 do not exist.",
+            "Nothing can be signed, and messages with ids above 255 cannot be sent.",
             "SERIALn_PROTOCOL = 2 (ArduPilot), MAV_PROTO_VER = 2 (PX4).",
         )
     if vehicle.signed:
@@ -116,15 +116,15 @@ def state(case: Case) -> Iterator[Finding]:
         yield Finding(
             f"no HEARTBEAT for {case.silent_for(mavlink.MAVLINK_MSG_ID_HEARTBEAT):.0f} s",
             Severity.BLOCKING,
-            "Whether it still follows is not known; after 3 s a companion sends nothing more.",
+            "It is unknown whether it still follows set-points; after 3 s a companion sends nothing more.",
             "See whether the autopilot hangs or the link is gone.",
         )
-    elif case.log and case.silent > _SILENT:
+    elif case.log and case.silent > _MAX_SILENCE_S:
         yield Finding(
             f"it says nothing in the last {case.silent:.0f} s of the log",
             Severity.WARNING,
-            "The link was lost, or it was switched off. All of this is about how it was before.",
-            "If it was not switched off: a stronger radio, or a companion on board, which needs none.",
+            "The link was lost, or the vehicle was switched off. All findings describe its state before.",
+            "If it was not switched off: a stronger radio, or a companion on board, which needs no radio.",
         )
     mode = mode_of(beat)
     armed = "armed" if case.vehicle.vehicle.armed else "disarmed"
@@ -140,7 +140,7 @@ def state(case: Case) -> Iterator[Finding]:
         )
     elif not case.vehicle.vehicle.armed or case.log:
         why = (
-            "So it ends in this log."
+            "This is its state where the log ends."
             if case.log
             else "An escort arms it after the operator's go, and changes the mode itself."
         )
@@ -149,9 +149,9 @@ def state(case: Case) -> Iterator[Finding]:
         yield Finding(
             what,
             Severity.WARNING,
-            "Somebody's set-points may steer it now."
+            "Set-points of another sender may steer it now."
             if steered
-            else "Somebody flies it: a go takes it over where it is.",
+            else "It is armed in another mode: after a go the companion takes it over where it is.",
             "Land and disarm it, unless it is meant to be taken over in the air.",
         )
     if beat.system_status in _STARTING:
@@ -174,9 +174,9 @@ def state(case: Case) -> Iterator[Finding]:
         yield Finding(
             f"while armed it fell out of the mode that set-points steer, {losses} times",
             Severity.WARNING,
-            "That is what happens when set-points stop for longer than COM_OF_LOSS_T; COM_OBL_RC_ACT "
-            "says what it does then.",
-            "Set COM_OBL_RC_ACT to 5 (hold), and look for what interrupted the stream.",
+            "It does so when set-points stop for longer than COM_OF_LOSS_T; COM_OBL_RC_ACT selects its "
+            "reaction.",
+            "Set COM_OBL_RC_ACT to 5 (hold), and find the cause of the interruption.",
         )
 
 

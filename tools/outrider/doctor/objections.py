@@ -13,14 +13,14 @@ from pymavlink.dialects.v20 import all as mavlink
 from mavlink_bridge.messages import CommandLong, Message, Source, SysStatus
 from outrider.doctor.sender_record import SenderRecord
 
-_LISTEN: Final = 35_000_000
+_WAIT_ARDUPILOT_US: Final = 35_000_000
 """µs; ArduPilot sends its texts every 30 s even without a request."""
-_LISTEN_PX4: Final = 6_000_000
+_WAIT_PX4_US: Final = 6_000_000
 """µs; PX4 reports on request and does not repeat it."""
-_SETTLED: Final = 2_000_000
+_SETTLING_US: Final = 2_000_000
 """Time to wait after a reason (µs): others follow at once."""
-_AGAIN: Final = 5_000_000
-_TRIES: Final = 3
+_REPEAT_INTERVAL_US: Final = 5_000_000
+_MAX_REQUESTS: Final = 3
 
 
 class Objections:
@@ -35,9 +35,9 @@ class Objections:
 
     def due(self, vehicle: SenderRecord, me: Source, now: int) -> list[Message]:
         """Return the messages to send at ``now`` (µs)."""
-        if not self._open(vehicle) or self._known(vehicle) or self._times >= _TRIES:
+        if not self._open(vehicle) or self._known(vehicle) or self._times >= _MAX_REQUESTS:
             return []
-        if self._first is not None and now - self._last < _AGAIN:
+        if self._first is not None and now - self._last < _REPEAT_INTERVAL_US:
             return []
         self._first = now if self._first is None else self._first
         self._last = now
@@ -50,8 +50,8 @@ class Objections:
         if not self._open(vehicle):
             return 0
         if self._known(vehicle):
-            return max(max(vehicle.objected_at, self._last) + _SETTLED - now, 0)
-        listen = _LISTEN_PX4 if vehicle.is_px4 else _LISTEN
+            return max(max(vehicle.objected_at, self._last) + _SETTLING_US - now, 0)
+        listen = _WAIT_PX4_US if vehicle.is_px4 else _WAIT_ARDUPILOT_US
         return listen if self._first is None else max(self._first + listen - now, 0)
 
     def _open(self, vehicle: SenderRecord) -> bool:

@@ -12,10 +12,10 @@ from mavlink_bridge.messages import GlobalPosition, GpsGlobalOrigin, HomePositio
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 
-_APART: Final = 3.0
-"""Largest horizontal distance between two reports of the same place (m)."""
-_FAR_HOME: Final = 500.0
-_WRONG_SIGN: Final = -0.5
+_MAX_DISTANCE_M: Final = 3.0
+"""Largest horizontal distance between the two reports of a vehicle at rest (m)."""
+_MAX_HOME_DISTANCE_M: Final = 500.0
+_MAX_REVERSED_SLOPE: Final = -0.5
 
 
 def origin(case: Case) -> Iterator[Finding]:
@@ -27,9 +27,9 @@ def origin(case: Case) -> Iterator[Finding]:
         yield Finding(
             f"the origin has moved, by {moved:.1f} m",
             Severity.WARNING,
-            "Positions before and after mean different places; a companion that misses it flies beside "
-            "its goal.",
-            "Let nobody set it in flight (SET_GPS_GLOBAL_ORIGIN), and begin with a good fix.",
+            "Local positions before and after differ by that; a companion that misses the change flies "
+            "beside its goal.",
+            "Do not set it in flight (SET_GPS_GLOBAL_ORIGIN), and begin with a good fix.",
         )
     if origins:
         last = origins[-1]
@@ -37,14 +37,14 @@ def origin(case: Case) -> Iterator[Finding]:
             yield Finding(
                 "the origin is at 0°, 0°",
                 Severity.BLOCKING,
-                "That is in the sea before Africa: it is not set.",
+                "This value means that it is not set.",
                 "Wait for a fix, or set it in a ground station where there is no GPS.",
             )
             return
         yield Finding(
             f"origin: {last.latitude:.7f}°, {last.longitude:.7f}°, {last.altitude:.1f} m above the sea",
             Severity.OK,
-            "Its own local frame begins there; each vehicle's is another one.",
+            "It is the origin of the vehicle's own local frame; each vehicle has another one.",
         )
         return
     if case.log:
@@ -64,8 +64,7 @@ def origin(case: Case) -> Iterator[Finding]:
     yield Finding(
         "no GPS_GLOBAL_ORIGIN, though it was asked for",
         Severity.BLOCKING,
-        "Its local frame begins nobody knows where, so that neither target nor neighbours can be placed "
-        "in it.",
+        "The origin of its local frame is unknown, so neither target nor neighbours can be placed in it.",
         "Wait for a fix; indoors set it in a ground station (SET_GPS_GLOBAL_ORIGIN).",
     )
 
@@ -89,15 +88,17 @@ def home(case: Case) -> Iterator[Finding]:
     )
     away = float(np.hypot(east, north))
     what = f"home is {away:.1f} m from the origin, {abs(up):.1f} m {'above' if up >= 0.0 else 'below'} it"
-    if away > _FAR_HOME:
+    if away > _MAX_HOME_DISTANCE_M:
         yield Finding(
             what,
             Severity.WARNING,
-            "A failsafe's return crosses all of that, and nobody's plan knows of it.",
+            "A failsafe's return flies this distance, and no other vehicle's plan allows for it.",
             "Set home here (MAV_CMD_DO_SET_HOME), or restart the autopilot where it stands.",
         )
     else:
-        yield Finding(what, Severity.OK, "Return and landing go to home, set-points count from the origin.")
+        yield Finding(
+            what, Severity.OK, "Return and landing go to home; set-points are relative to the origin."
+        )
 
 
 def agreement(case: Case) -> Iterator[Finding]:
@@ -111,14 +112,13 @@ def agreement(case: Case) -> Iterator[Finding]:
         claimed = np.asarray(_frame(origins[-1]).to_enu(there.latitude, there.longitude, there.altitude))
         off = claimed - ned_to_enu(np.asarray(here.position_ned))
         away = float(np.hypot(off[0], off[1]))
-        allowed = _APART + 0.2 * float(np.linalg.norm(here.velocity_ned))
+        allowed = _MAX_DISTANCE_M + 0.2 * float(np.linalg.norm(here.velocity_ned))
         if not away <= allowed:
             yield Finding(
                 f"local and global position disagree by {away:.1f} m",
                 Severity.BLOCKING,
-                "Either the origin is not the one that the local frame counts from, or one of the two is "
-                "wrong.",
-                "Restart the autopilot; if it stays so, do not fly this firmware with others.",
+                "Either the reported origin is not the local frame's, or one of the positions is wrong.",
+                "Restart the autopilot; if they still disagree, do not fly this firmware with others.",
             )
         else:
             yield Finding(
@@ -127,12 +127,12 @@ def agreement(case: Case) -> Iterator[Finding]:
                 "The origin is the right one.",
             )
     slope = case.vehicle.climb.value
-    if slope is not None and slope < _WRONG_SIGN:
+    if slope is not None and slope < _MAX_REVERSED_SLOPE:
         yield Finding(
             "GLOBAL_POSITION_INT says vz positive when it climbs",
             Severity.WARNING,
-            "MAVLink wants it positive downwards: others would expect it to sink when it rises.",
-            "Turn the sign where this vehicle is a target or a neighbour (velocity_up: true).",
+            "MAVLink defines vz as positive downwards: others would predict a descent when it climbs.",
+            "Reverse the sign where this vehicle is a target or a neighbour (velocity_up: true).",
         )
 
 
@@ -141,7 +141,7 @@ def _frame(place: GpsGlobalOrigin) -> FleetFrame:
 
 
 def _worked_out(case: Case) -> tuple[float, float, float] | None:
-    """Return the origin of the local frame, computed from one position in both frames."""
+    """Return the local frame's origin (°, °, m), computed from one position in both frames."""
     if case.vehicle.pair is None:
         return None
     there, here = case.vehicle.pair

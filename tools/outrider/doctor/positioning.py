@@ -14,7 +14,7 @@ _POOR_HDOP, _POOR_ACCURACY = 2.0, 2.5
 
 
 def estimator(case: Case) -> Iterator[Finding]:
-    """Yield findings from ArduPilot's EKF_STATUS_REPORT or PX4's ESTIMATOR_STATUS: ten bits agree."""
+    """Yield findings from ArduPilot's EKF_STATUS_REPORT or PX4's ESTIMATOR_STATUS: flag bits 0 to 9 agree."""
     reported: EkfStatus | EstimatorStatus | None
     reported = case.vehicle.latest(EstimatorStatus) if case.px4 else case.vehicle.latest(EkfStatus)
     if reported is None:
@@ -38,7 +38,7 @@ def estimator(case: Case) -> Iterator[Finding]:
     if not case.px4 and reported.flags & mavlink.EKF_CONST_POS_MODE:
         why = "It assumes that it does not move at all (constant position)."
     elif reported.flags & mavlink.ESTIMATOR_POS_HORIZ_REL:
-        why = "It knows only how it moved (optical flow, dead reckoning), not where on the globe it is."
+        why = "It has only a relative position (optical flow, dead reckoning), not one on the globe."
     else:
         why = "It has no position."
     yield Finding(

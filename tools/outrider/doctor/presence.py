@@ -22,7 +22,7 @@ def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
             return Finding(
                 f"{hearing.refused} frames arrive, and none counts: {hearing.refusal}",
                 severity,
-                "Who has a key believes only what is signed with it, and is new.",
+                "With --key the doctor accepts only new frames that are signed with this key.",
                 "Give the vehicle the same key (docs/signing.md), or leave --key out; see that the "
                 "clocks are right.",
             )
@@ -37,8 +37,8 @@ def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
         return Finding(
             f"nothing arrives in {hearing.seconds:.0f} s",
             severity,
-            "There is nobody to talk to.",
-            "See that the autopilot runs, and that this is where it speaks: udpin:127.0.0.1:14540 for "
+            "There is no vehicle to examine.",
+            "See that the autopilot runs, and that it sends to this endpoint: udpin:127.0.0.1:14540 for "
             "PX4's offboard link, tcp:127.0.0.1:5760 for ArduPilot's SITL, /dev/DEVICE,BAUD for a serial "
             "port; that nobody else has it open; and that TX and RX are crossed.",
         )
@@ -47,8 +47,8 @@ def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
         return Finding(
             f"system {system} is not there; here are {listed(present)}",
             severity,
-            "Commands to a system id that nobody has are obeyed by nobody.",
-            f"Say --system {present[0]}, or set the vehicle's id to {system} (SYSID_THISMAV; MAV_SYS_ID "
+            "No vehicle obeys commands to an id that none has.",
+            f"Use --system {present[0]}, or set the vehicle's id to {system} (SYSID_THISMAV; MAV_SYS_ID "
             "with PX4).",
         )
     others = ", ".join(f"{one.source.system}/{one.source.component}" for one in hearing.senders.values())
@@ -84,8 +84,8 @@ def company(case: Case) -> Iterator[Finding]:
         yield Finding(
             f"more than {MOST} senders",
             Severity.WARNING,
-            "Somebody floods the link, or makes senders up.",
-            "Find out who can send there; sign the link (docs/signing.md).",
+            "A node floods the link, or invents senders.",
+            "Find out which nodes can send there; sign the link (docs/signing.md).",
         )
 
 
@@ -100,14 +100,14 @@ def _about(case: Case, sender: SenderRecord) -> Iterator[Finding]:
             Severity.NOTE if case.log else Severity.BLOCKING,
             "The recorded flight was steered by it."
             if case.log
-            else "Two who steer one vehicle make it jump between what each wants.",
+            else "With two senders of set-points the vehicle jumps between their set-points.",
             "" if case.log else f"End the program that speaks as {name} before an escort begins.",
         )
     elif own and component == COMPONENT:
         yield Finding(
             f"a companion is at work already ({name})",
             Severity.NOTE if case.log else Severity.WARNING,
-            "A second one with the same id would be taken for it.",
+            "Other vehicles cannot tell a second one with the same id from it.",
             "" if case.log else "Use it, or end it before starting another.",
         )
     elif sender.is_ground_station:
@@ -119,7 +119,7 @@ def _about(case: Case, sender: SenderRecord) -> Iterator[Finding]:
     elif sender.heartbeat is not None and sender.heartbeat.autopilot == mavlink.MAV_AUTOPILOT_INVALID:
         kind = (enumerated("MAV_TYPE", sender.heartbeat.type) or "").removeprefix("MAV_TYPE_").lower()
         yield Finding(
-            f"another component: {name}, {kind.replace('_', ' ')}", Severity.NOTE, "It does not disturb."
+            f"another component: {name}, {kind.replace('_', ' ')}", Severity.NOTE, "It has no effect."
         )
 
 

@@ -1,8 +1,8 @@
 """PX4's reasons against arming, from EVENT messages (410).
 
 PX4 1.16 sends STATUSTEXT only over links on which it receives a ground station's heartbeat, but EVENT over
-every link. If its mode is the reason, only an EVENT says so. pymavlink's dialects have no EVENT, so it is
-decoded here. An id is the low 24 bits of the FNV-1a hash of the event's name.
+every link. If the mode is the reason, only an EVENT reports it. pymavlink's dialects have no EVENT, so it is
+decoded here. An event's id is the low 24 bits of the FNV-1a hash of the event's name.
 """
 
 from __future__ import annotations
@@ -140,7 +140,10 @@ def genuine(frame: Frame) -> bool:
 
 
 def reason(frame: Frame, custom_mode: int) -> str | None:
-    """Return the reason against arming in mode ``custom_mode`` from an EVENT; None for all other frames."""
+    """Return the reason in an EVENT against arming in mode ``custom_mode``.
+
+    None for other frames, unknown or less severe events, and events that do not concern this mode.
+    """
     if not genuine(frame):
         return None
     payload = frame.payload.ljust(LAYOUT.size, b"\0")

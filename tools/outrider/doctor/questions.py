@@ -29,20 +29,21 @@ STRANGER: Final = Source(245, COMPONENT)
 
 A serial link, for example, may wait for a first message.
 """
-_HEARTBEAT_EVERY: Final = 1_000_000
-_PATIENCE: Final = 700_000
-"""Time until a request is repeated (µs), and until streams that flow unasked have arrived."""
-_LISTEN: Final = 2_000_000
-_TRIES: Final = 3
-_AT_ONCE: Final = 2
+_HEARTBEAT_INTERVAL_US: Final = 1_000_000
+_REPEAT_INTERVAL_US: Final = 700_000
+"""Time until a request is repeated (µs)."""
+_STREAM_WAIT_US: Final = 2_000_000
+"""Time to wait for streams that arrive without a request (µs), before they are requested."""
+_MAX_REQUESTS: Final = 3
+_MAX_REQUESTS_PER_STEP: Final = 2
 """Maximum number of requests in one step: 57 600 baud carry a hundred a second, but also other traffic."""
-_ONCE: Final = (
+_RARELY_STREAMED: Final = (
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION,
 )
-"""Requested at once, as they are rarely streamed."""
-_FLOWING: Final = (
+"""Requested immediately, as they are rarely streamed."""
+_STREAMED: Final = (
     mavlink.MAVLINK_MSG_ID_SYS_STATUS,
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
     mavlink.MAVLINK_MSG_ID_ATTITUDE,
@@ -65,14 +66,14 @@ class _Asked(NamedTuple):
 
 
 class Questions:
-    """Requests to one vehicle; ``examination`` identifies it and holds the answers."""
+    """Requests to one vehicle; ``examination`` identifies the vehicle and holds the answers."""
 
     def __init__(self, examination: Examination) -> None:
         self._examination = examination
         self._asked: dict[int | str, _Asked] = {}
         self._objections = Objections()
-        self._met: int | None = None
-        self._whom: Source | None = None
+        self._met_at: int | None = None
+        self._addressee: Source | None = None
         self._beat: int | None = None
         self.me = STRANGER
 
@@ -80,30 +81,31 @@ class Questions:
         """Return the messages to send at ``now`` (µs)."""
         vehicle = self._examination.vehicle
         if vehicle is not None:
-            if vehicle.source != self._whom:
+            if vehicle.source != self._addressee:
                 # A vehicle with a lower id was received: start again with it.
-                self._whom, self._met = vehicle.source, now
+                self._addressee, self._met_at = vehicle.source, now
                 self._asked.clear()
                 self._examination.asked.clear()
                 self._objections = Objections()
             self.me = self._examination.me = Source(vehicle.source.system, COMPONENT)
         said: list[Message] = []
-        if self._beat is None or now - self._beat >= _HEARTBEAT_EVERY:
+        if self._beat is None or now - self._beat >= _HEARTBEAT_INTERVAL_US:
             self._beat = now
             said.append(onboard_heartbeat(self.me))
         if vehicle is not None:
             open_ones = [key for key in self._wanted(vehicle, now) if self._is_open(key, vehicle, now)]
-            said += [self._ask(key, vehicle, now) for key in open_ones[:_AT_ONCE]]
+            said += [self._ask(key, vehicle, now) for key in open_ones[:_MAX_REQUESTS_PER_STEP]]
             said += self._objections.due(vehicle, self.me, now)
         return said
 
     def done(self, now: int) -> bool:
-        """Return whether every request was answered, or sent often enough."""
+        """Return whether every request was answered or sent three times; False for the first 2 s."""
         vehicle = self._examination.vehicle
-        if vehicle is None or self._met is None or now - self._met < _LISTEN:
+        if vehicle is None or self._met_at is None or now - self._met_at < _STREAM_WAIT_US:
             return False
         return not any(
-            self._asked.get(key, _Asked(0, 0)).times < _TRIES or now - self._asked[key].last < _PATIENCE
+            self._asked.get(key, _Asked(0, 0)).times < _MAX_REQUESTS
+            or now - self._asked[key].last < _REPEAT_INTERVAL_US
             for key in self._wanted(vehicle, now)
             if not _answered(key, vehicle)
         )
@@ -115,14 +117,18 @@ class Questions:
 
     def _wanted(self, vehicle: SenderRecord, now: int) -> tuple[int | str, ...]:
         px4 = vehicle.is_px4
-        wanted: tuple[int | str, ...] = _ONCE + names(px4=px4)
-        if self._met is not None and now - self._met >= _LISTEN:
-            wanted += (*_FLOWING, _ESTIMATOR[px4])
+        wanted: tuple[int | str, ...] = _RARELY_STREAMED + names(px4=px4)
+        if self._met_at is not None and now - self._met_at >= _STREAM_WAIT_US:
+            wanted += (*_STREAMED, _ESTIMATOR[px4])
         return wanted
 
     def _is_open(self, key: int | str, vehicle: SenderRecord, now: int) -> bool:
         times, last = self._asked.get(key, _Asked(0, 0))
-        return not _answered(key, vehicle) and times < _TRIES and (times == 0 or now - last >= _PATIENCE)
+        return (
+            not _answered(key, vehicle)
+            and times < _MAX_REQUESTS
+            and (times == 0 or now - last >= _REPEAT_INTERVAL_US)
+        )
 
     def _ask(self, key: int | str, vehicle: SenderRecord, now: int) -> Message:
         times, _ = self._asked.get(key, _Asked(0, 0))

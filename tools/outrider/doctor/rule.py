@@ -32,10 +32,10 @@ def number(value: float, case: Case) -> Meaning:
     """Judge MAV_SYS_ID and SYSID_THISMAV."""
     here = case.vehicle.source.system
     if value == here:
-        return Meaning(OK, "It is the id that it speaks with.")
+        return Meaning(OK, "The vehicle sends with this id.")
     return Meaning(
         WARNING,
-        f"It still speaks as system {here}: it will be {value:g} after the next start.",
+        f"It still sends as system {here}; the id becomes {value:g} at the next start.",
         "Restart it.",
     )
 
@@ -45,16 +45,16 @@ def fence(value: float, _case: Case) -> Meaning:
     if value == 0:
         return Meaning(
             NOTE,
-            "Nothing but the companion's own limits keeps it in.",
-            "A fence a little wider than those is a second line.",
+            "Only the companion's own limits confine it.",
+            "A fence slightly wider than these limits is a second protection.",
         )
     return Meaning(
-        NOTE, "What breaks the fence ends the escort.", "See that the escort's limits lie inside it."
+        NOTE, "A breach of the fence ends the escort.", "See that the escort's limits lie inside it."
     )
 
 
 def low_battery(value: float, _case: Case) -> Meaning:
     """Judge COM_LOW_BAT_ACT and BATT_FS_LOW_ACT."""
     if value == 0:
-        return Meaning(NOTE, "A low battery is only told, nothing is done: the companion alone sees to it.")
+        return Meaning(NOTE, "A low battery is only reported; only the companion reacts.")
     return Meaning(OK, "On a low battery it lands or returns.")

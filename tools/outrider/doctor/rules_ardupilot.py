@@ -14,7 +14,7 @@ _BRIEF, _STOCK = 1.0, 3.0
 def _guided_timeout(value: float, _case: Case) -> Meaning:
     if value < 0.3:
         return Meaning(WARNING, "A short break of the link makes it brake.", "Set GUID_TIMEOUT to 1 s.")
-    flies_on = f"When set-points stop it flies on as last told for {value:g} s, then brakes"
+    flies_on = f"When set-points stop it follows the last one for {value:g} s, then brakes"
     if value <= _BRIEF:
         return Meaning(OK, f"{flies_on}.")
     saved = value - _BRIEF
@@ -30,7 +30,7 @@ def _guided_timeout(value: float, _case: Case) -> Meaning:
 
 def _ground_failsafe(value: float, case: Case) -> Meaning:
     if value == 0:
-        return Meaning(NOTE, "It flies on when the ground station is lost: the companion alone sees to it.")
+        return Meaning(NOTE, "It flies on when the ground station is lost; only the companion reacts.")
     station = case.parameter("SYSID_MYGCS")
     there = {one.source.system for one in case.hearing.senders.values() if one.is_ground_station}
     if station is None or station in there:
@@ -42,19 +42,19 @@ def _ground_failsafe(value: float, case: Case) -> Meaning:
     seen = ", ".join(map(str, sorted(there))) or "none"
     return Meaning(
         WARNING,
-        f"It watches for ground station {station:g} (SYSID_MYGCS), and here is {seen}: once seen and "
-        "lost, it returns or lands.",
+        f"It watches for ground station {station:g} (SYSID_MYGCS); on this link: {seen}. If that station "
+        "appears and is lost, the vehicle returns or lands.",
         "Give the ground station that id, set SYSID_MYGCS to its own, or FS_GCS_ENABLE to 0.",
     )
 
 
 def _station(value: float, case: Case) -> Meaning:
     if value == case.vehicle.source.system:
-        return Meaning(WARNING, "It takes itself for its ground station.", "Set SYSID_MYGCS to 255.")
+        return Meaning(WARNING, "Its own id is the ground station's.", "Set SYSID_MYGCS to 255.")
     return Meaning(
         OK,
-        "Whose HEARTBEAT FS_GCS_ENABLE watches. A companion speaks with the vehicle's own id and never "
-        "counts as it.",
+        "FS_GCS_ENABLE monitors the HEARTBEAT of this id. A companion sends with the vehicle's own id and "
+        "never counts as the ground station.",
     )
 
 
@@ -76,10 +76,10 @@ def _estimator_failsafe(value: float, _case: Case) -> Meaning:
 ARDUPILOT_RULES: Final = (
     Rule("GUID_TIMEOUT", _guided_timeout, "How long it flies on when set-points stop: 3 s by default."),
     Rule("FS_GCS_ENABLE", _ground_failsafe, "What it does when the ground station is lost."),
-    Rule("SYSID_MYGCS", _station, "Whose HEARTBEAT counts as the ground station's: 255 by default."),
+    Rule("SYSID_MYGCS", _station, "Id of the ground station that FS_GCS_ENABLE monitors: 255 by default."),
     Rule("FS_EKF_ACTION", _estimator_failsafe, "What it does when its estimator fails."),
     Rule("ARMING_CHECK", _arming, "Whether it checks itself before it arms."),
-    Rule("FENCE_ENABLE", fence, "Whether a fence holds it in."),
+    Rule("FENCE_ENABLE", fence, "Whether a fence confines it."),
     Rule("BATT_FS_LOW_ACT", low_battery, "What it does when the battery is low."),
     Rule("SYSID_THISMAV", number, "Its id after the next start."),
 )

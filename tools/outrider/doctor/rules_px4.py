@@ -34,7 +34,7 @@ def _loss_action(value: float, _case: Case) -> Meaning:
         return Meaning(
             BLOCKING, "When set-points stop it stops its motors in the air.", "Set it to 5 (hold)."
         )
-    return Meaning(WARNING, "What that means is not known here.", "Set it to 5 (hold).")
+    return Meaning(WARNING, "The doctor does not know this value.", "Set it to 5 (hold).")
 
 
 def _loss_time(value: float, _case: Case) -> Meaning:
@@ -42,7 +42,9 @@ def _loss_time(value: float, _case: Case) -> Meaning:
         return Meaning(WARNING, "A short break of the link ends OFFBOARD.", "Set COM_OF_LOSS_T to 1 s.")
     if value > 2.0:
         return Meaning(
-            WARNING, f"For {value:g} s it keeps on going as last told, blind.", "Set COM_OF_LOSS_T to 1 s."
+            WARNING,
+            f"It follows the last set-point for {value:g} s after the stream stops.",
+            "Set COM_OF_LOSS_T to 1 s.",
         )
     return Meaning(OK, f"OFFBOARD ends {value:g} s after the last set-point.")
 
@@ -52,7 +54,7 @@ def _remote_lost(value: float, _case: Case) -> Meaning:
         return Meaning(OK, "OFFBOARD goes on without remote control.")
     return Meaning(
         NOTE,
-        "Once a remote control was there and is lost, NAV_RCL_ACT ends OFFBOARD.",
+        "If a remote control was connected and is lost, NAV_RCL_ACT ends OFFBOARD.",
         "COM_RCL_EXCEPT with bit 2 (value 4) keeps OFFBOARD; leave it if a pilot stands by.",
     )
 
@@ -67,7 +69,7 @@ def _failures(value: float, _case: Case) -> Meaning:
 
 def _ground_lost(value: float, _case: Case) -> Meaning:
     if value == 0:
-        return Meaning(NOTE, "It flies on when the ground station is lost: the companion alone sees to it.")
+        return Meaning(NOTE, "It flies on when the ground station is lost; only the companion reacts.")
     return Meaning(
         NOTE,
         "When the ground station is lost the autopilot acts by itself (hold 1, return 2, land 3, …).",

@@ -36,11 +36,11 @@ from outrider.doctor.slope import Slope
 M = TypeVar("M", bound=Message)
 _KEPT_FRAMES, _KEPT_TEXTS, _KEPT_PARAMETERS, _KEPT_PLACES = 32, 40, 4096, 8
 _KEPT_OBJECTIONS: Final = 16
-_OBJECTING: Final = ("prearm", "preflight", "arming denied", "arm:")
-_REPEATED: Final = 35_000_000
+_REASON_PREFIXES: Final = ("prearm", "preflight", "arming denied", "arm:")
+_REASON_LIFETIME_US: Final = 35_000_000
 """µs; ArduPilot repeats its reasons every 30 s, so a reason that is not repeated is resolved."""
-_TOGETHER: Final = 60_000
-"""Largest time between two positions that are compared (µs)."""
+_MAX_PAIR_INTERVAL_US: Final = 60_000
+"""Largest difference of the time stamps of two positions that are compared (µs)."""
 
 
 class Stream:
@@ -65,16 +65,17 @@ class Stream:
         return (self.count - 1) / ((self.last - self.first) * 1e-6) if self.last > self.first else 0.0
 
 
-_CLOCKED = (Attitude, AttitudeQuaternion, GlobalPosition, LocalPosition, PositionTarget, SystemTime)
-"""Messages whose time stamp is of the autopilot's one clock; RAW_IMU's, for example, is of a sensor's."""
+_BOOT_TIMED = (Attitude, AttitudeQuaternion, GlobalPosition, LocalPosition, PositionTarget, SystemTime)
+"""Messages with a time stamp of the autopilot's common clock; RAW_IMU, for example, has a sensor's."""
 
 
 class SenderRecord:
-    """Record of all that ``source`` has sent. Repeated frames are counted in ``repeated`` only.
+    """Record of all that ``source`` has sent.
 
-    ``origins``: the different GPS_GLOBAL_ORIGINs in their order. ``pair``: the last global and local position
-    of about one instant. ``guided_losses``: number of times that its mode, while armed, changed from the one
-    that follows set-points to a fallback, as it does when set-points stop.
+    ``repeated``: number of frames equal to one of the last 32, which are ignored otherwise. ``origins``: each
+    GPS_GLOBAL_ORIGIN that differs from the previous one, at most eight. ``pair``: the last global and local
+    position whose time stamps differ by at most 60 ms. ``guided_losses``: number of times that the armed
+    vehicle left the mode that follows set-points for a failsafe's mode, as when set-points stop.
     """
 
     def __init__(self, source: Source) -> None:
@@ -120,14 +121,16 @@ class SenderRecord:
         return cast("M | None", self._latest.get(kind))
 
     def rate(self, message_id: int) -> float:
-        """Return messages per second of the sender's clock: a simulation may run faster than the wall's."""
+        """Return messages per second of the sender's clock: a simulation may be faster than real time."""
         stream = self.streams.get(message_id)
         return 0.0 if stream is None else stream.rate / (self.clock.rate or 1.0)
 
     @property
     def objections(self) -> list[str]:
-        """Last reasons against arming, from its texts or its events."""
-        return [text for text, then in self._objections.items() if self.objected_at - then <= _REPEATED]
+        """Reasons against arming from its texts and events, up to 35 s older than the latest."""
+        return [
+            text for text, then in self._objections.items() if self.objected_at - then <= _REASON_LIFETIME_US
+        ]
 
     @property
     def objected_at(self) -> int:
@@ -136,7 +139,7 @@ class SenderRecord:
 
     @property
     def heartbeat(self) -> Heartbeat | None:
-        """Last heartbeat, of whatever kind."""
+        """Last heartbeat, also of a component that is no autopilot."""
         return self.latest(Heartbeat)
 
     @property
@@ -160,7 +163,7 @@ class SenderRecord:
         return self.heartbeat is not None and self.heartbeat.type == mavlink.MAV_TYPE_GCS
 
     def _note(self, now: int, message: Message) -> None:
-        if isinstance(message, _CLOCKED) and message.time_boot:
+        if isinstance(message, _BOOT_TIMED) and message.time_boot:
             self.clock.tell(now, message, message.time_boot)
         guided = self.vehicle.armed and self.vehicle.in_guided_mode
         self.vehicle.receive(message)
@@ -173,7 +176,7 @@ class SenderRecord:
                 self.guided_losses += guided and self.vehicle.armed and failed
             case StatusText():
                 self.texts.append((now, message))
-                if message.text.lower().startswith(_OBJECTING):
+                if message.text.lower().startswith(_REASON_PREFIXES):
                     self._object(now, message.text.strip())
             case ParamValue() if len(self.parameters) < _KEPT_PARAMETERS:
                 self.parameters[message.name] = message
@@ -215,5 +218,9 @@ class SenderRecord:
             self.origins.append(origin)
 
     def _match(self, there: GlobalPosition | None, here: LocalPosition | None) -> None:
-        if there is not None and here is not None and abs(there.time_boot - here.time_boot) <= _TOGETHER:
+        if (
+            there is not None
+            and here is not None
+            and abs(there.time_boot - here.time_boot) <= _MAX_PAIR_INTERVAL_US
+        ):
             self.pair = there, here

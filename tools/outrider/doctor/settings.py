@@ -14,7 +14,7 @@ from outrider.doctor.rule import Rule
 from outrider.doctor.rules_ardupilot import ARDUPILOT_RULES
 from outrider.doctor.rules_px4 import PX4_RULES
 
-_ALSO: Final = {
+_OTHER_PARAMETERS: Final = {
     True: ("BAT_LOW_THR", *stock_parameters(mavlink.MAV_AUTOPILOT_PX4)),
     False: ("BATT_LOW_VOLT", *stock_parameters(mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)),
 }
@@ -29,11 +29,11 @@ def rules(*, px4: bool) -> tuple[Rule, ...]:
 
 def names(*, px4: bool) -> tuple[str, ...]:
     """Return the names of the parameters to request."""
-    return tuple(rule.name for rule in rules(px4=px4)) + _ALSO[px4]
+    return tuple(rule.name for rule in rules(px4=px4)) + _OTHER_PARAMETERS[px4]
 
 
 def settings(case: Case) -> Iterator[Finding]:
-    """Yield one finding for each known parameter, and one for those that are not known."""
+    """Yield one finding for each received or urgent parameter, and one for all others that are missing."""
     if case.profile is None:
         return
     unreported = []
@@ -59,7 +59,7 @@ def settings(case: Case) -> Iterator[Finding]:
         yield Finding(
             f"not {'in the log' if case.log else 'told'}: {', '.join(others)}",
             Severity.NOTE,
-            "What the autopilot does when something is lost is not known from here.",
+            "How the autopilot reacts to a loss of link, estimate or battery is unknown.",
             "Have the ground station load all parameters while it records."
             if case.log
             else "Read them in a ground station.",

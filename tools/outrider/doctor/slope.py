@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-_ENOUGH: Final = 0.5
+_MIN_SQUARE_SUM: Final = 0.5
 
 
 class Slope:
-    """Least-squares slope through zero, of changes that have the same unit."""
+    """Least-squares slope, without intercept, of one quantity's changes over the other's (same unit)."""
 
     def __init__(self) -> None:
         self._both = self._square = 0.0
@@ -21,4 +21,4 @@ class Slope:
     @property
     def value(self) -> float | None:
         """Slope; None if too little has changed to tell."""
-        return self._both / self._square if self._square > _ENOUGH else None
+        return self._both / self._square if self._square > _MIN_SQUARE_SUM else None

@@ -11,15 +11,15 @@ from companion.flight.readiness import STREAMS
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 
-_ASKED: Final = {number: 1e6 / each for number, each in STREAMS.items()}
+_REQUESTED_HZ: Final = {number: 1e6 / each for number, each in STREAMS.items()}
 """Requested rates (Hz) by message id."""
 
 
 class StreamRequirement(NamedTuple):
     """Requirement for one message.
 
-    ``wanted``: rate (Hz) that ``fly`` requests; ``least``: rate that suffices; ``essential``: an escort is
-    impossible without the message.
+    ``wanted``: rate (Hz) that ``fly`` requests (except for GLOBAL_POSITION_INT, which it does not request);
+    ``least``: rate (Hz) that suffices; ``essential``: an escort is impossible without the message.
     """
 
     message_id: int
@@ -34,23 +34,23 @@ NEEDS: Final = (
     StreamRequirement(
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
         "LOCAL_POSITION_NED",
-        _ASKED[mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED],
+        _REQUESTED_HZ[mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED],
         2.0,
         True,
-        "Every plan begins where this says that it is.",
+        "Every plan begins at this position.",
     ),
     StreamRequirement(
         mavlink.MAVLINK_MSG_ID_ATTITUDE,
         "ATTITUDE",
-        _ASKED[mavlink.MAVLINK_MSG_ID_ATTITUDE],
+        _REQUESTED_HZ[mavlink.MAVLINK_MSG_ID_ATTITUDE],
         2.0,
         True,
-        "It says where the nose points when set-points begin.",
+        "It gives the heading at which the set-points begin.",
     ),
     StreamRequirement(
         mavlink.MAVLINK_MSG_ID_SYS_STATUS,
         "SYS_STATUS",
-        _ASKED[mavlink.MAVLINK_MSG_ID_SYS_STATUS],
+        _REQUESTED_HZ[mavlink.MAVLINK_MSG_ID_SYS_STATUS],
         0.2,
         True,
         "It has the pre-arm check and the battery.",
@@ -58,10 +58,10 @@ NEEDS: Final = (
     StreamRequirement(
         mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
         "EXTENDED_SYS_STATE",
-        _ASKED[mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE],
+        _REQUESTED_HZ[mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE],
         0.5,
         False,
-        "It says whether an armed vehicle stands or flies.",
+        "It tells whether an armed vehicle is on the ground or in the air.",
     ),
     StreamRequirement(
         mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
@@ -72,10 +72,10 @@ NEEDS: Final = (
         "Others see by it where this vehicle is, and it checks the local position.",
     ),
 )
-_NEARLY: Final = 0.85
-_GONE: Final = 5.0
+_MIN_RATE_RATIO: Final = 0.85
+_MIN_SILENCE_S: Final = 5.0
 """Shortest silence (s) after which a streamed message counts as stopped."""
-_INTERVALS: Final = 10.0
+_MIN_SILENT_INTERVALS: Final = 10.0
 
 
 def streams(case: Case, asked: dict[int, int]) -> Iterator[Finding]:
@@ -92,13 +92,13 @@ def _judge(case: Case, need: StreamRequirement, asked: int) -> Finding:
         return Finding(
             f"{name} does not come",
             Severity.BLOCKING if need.essential else Severity.WARNING,
-            f"{need.why} It is missing in the log: nobody asked for it, or the autopilot has none to tell."
+            f"{need.why} It is missing in the log: it was not requested, or the autopilot does not have it."
             if case.log
             else f"{need.why} It was asked for and did not come.",
             f"Record it: {order}."
             if case.log
-            else "If GPS and estimator are bad, mend them first; else see that the link carries what is "
-            "asked for.",
+            else "If GPS or estimator are bad, correct them first; otherwise check that the link has the "
+            "capacity for it.",
         )
     if stream.count <= max(asked, 1):
         return Finding(
@@ -109,7 +109,7 @@ def _judge(case: Case, need: StreamRequirement, asked: int) -> Finding:
         )
     rate = case.vehicle.rate(need.message_id)
     silence = case.silent_for(need.message_id)
-    if silence > max(_GONE, _INTERVALS / rate if rate else 0.0):
+    if silence > max(_MIN_SILENCE_S, _MIN_SILENT_INTERVALS / rate if rate else 0.0):
         return Finding(
             f"{name} has stopped, {silence:.0f} s ago",
             Severity.BLOCKING if need.essential and not case.log else Severity.WARNING,
@@ -117,14 +117,14 @@ def _judge(case: Case, need: StreamRequirement, asked: int) -> Finding:
             "It ends before the log does." if case.log else "See what happened to GPS, estimator or link.",
         )
     what = f"{name} at {rate:.3g} Hz"
-    if rate >= _NEARLY * need.wanted:
+    if rate >= _MIN_RATE_RATIO * need.wanted:
         return Finding(what, Severity.OK, need.why)
     if rate >= need.least:
         return Finding(what, Severity.NOTE, need.why, f"Nothing: fly asks for {need.wanted:g} Hz ({order}).")
     return Finding(
         what,
         Severity.WARNING,
-        f"{need.why} Slower than {need.least:g} Hz is taken for lost from time to time.",
+        f"{need.why} Below {need.least:g} Hz a companion may at times treat it as lost.",
         f"fly asks for {need.wanted:g} Hz ({order}); see that the link has room for it (57 600 baud carry "
         "5.8 kB/s).",
     )

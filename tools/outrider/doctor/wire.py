@@ -10,10 +10,10 @@ from outrider.doctor.finding import Finding, Severity
 from outrider.doctor.hearing import Hearing
 from outrider.doctor.presence import listed
 
-_MANY_BAD: Final = 0.01
-_SEVERAL: Final = 3
-_LONG_ENOUGH: Final = 2.0
-_WANTED: Final = 2500.0
+_MIN_REPORTED_SHARE: Final = 0.01
+_MIN_COUNT: Final = 3
+_MIN_DURATION_S: Final = 2.0
+_FLY_BYTES_PER_S: Final = 2500.0
 """Bytes/s: LOCAL_POSITION_NED (40) at 50 Hz, ATTITUDE (40) at 10 Hz, and little else."""
 
 
@@ -22,10 +22,10 @@ def wire(case: Case) -> Iterator[Finding]:
     yield from _shared_ids(case)
     if case.hearing.refused:
         yield Finding(
-            f"{case.hearing.refused} frames do not count: {case.hearing.refusal}",
+            f"{case.hearing.refused} frames were refused: {case.hearing.refusal}",
             Severity.WARNING,
-            "Somebody on the link has not the key, or says again what was said before.",
-            "Give the key to all who belong here; find out who else can send.",
+            "A sender on the link does not have the key, or repeats earlier frames.",
+            "Give the key to all legitimate senders; find out which others can send.",
         )
     yield from _damage(case.hearing)
     yield from _load(case)
@@ -48,58 +48,58 @@ def _shared_ids(case: Case) -> Iterator[Finding]:
             f"{len(others) + 1} autopilots in system {number}: components {components}",
             Severity.WARNING,
             f"Only component {vehicle.source.component} was looked at; orders to the whole system reach all.",
-            "An escort talks to component 1 only. See which of them flies the vehicle.",
+            "Find out which component controls the vehicle.",
         )
     if number == 0:
         yield Finding(
             "the vehicle's system id is 0",
             Severity.BLOCKING,
-            "That means everybody: nothing can be addressed to it.",
+            "Id 0 addresses all systems: no message can be addressed to this vehicle alone.",
             "Set SYSID_THISMAV (ArduPilot) or MAV_SYS_ID (PX4) to 1…250.",
         )
     if number == 255:
         yield Finding(
             "the vehicle's system id is 255",
             Severity.WARNING,
-            "That is what ground stations take: each may think that the other is itself.",
+            "Ground stations use 255: each may take the other's messages for its own.",
             "Set SYSID_THISMAV (ArduPilot) or MAV_SYS_ID (PX4) to 1…250.",
         )
-    if vehicle.repeated >= max(_SEVERAL, _MANY_BAD * vehicle.frames):
+    if vehicle.repeated >= max(_MIN_COUNT, _MIN_REPORTED_SHARE * vehicle.frames):
         yield Finding(
             f"{vehicle.repeated} frames came twice",
             Severity.NOTE if case.log else Severity.WARNING,
-            "There are two ways to here, or a loop. Copies are left out here, but take room on a radio.",
-            "Look for an endpoint that stands twice in the router's configuration.",
+            "Frames arrive over two routes, or in a loop. The doctor ignores copies, but they load the link.",
+            "Look for an endpoint that is listed twice in the router's configuration.",
         )
 
 
 def _damage(hearing: Hearing) -> Iterator[Finding]:
     share = hearing.bad / max(hearing.bad + hearing.frames, 1)
-    if share > _MANY_BAD and hearing.bad >= _SEVERAL:
+    if share > _MIN_REPORTED_SHARE and hearing.bad >= _MIN_COUNT:
         yield Finding(
             f"{share:.0%} of the frames are damaged ({hearing.bad})",
             Severity.WARNING,
-            "What is lost is not sent again: a plan, a position, an order may be among it.",
-            "Check cable, baud rate and the radio's distance; use flow control where there is some.",
+            "A lost position or plan is missing until the next message; commands are repeated.",
+            "Check cable, baud rate and the radio's distance; use flow control if the port has it.",
         )
 
 
 def _load(case: Case) -> Iterator[Finding]:
     """Yield a finding on the load of a serial port, at ten bits per byte."""
     hearing = case.hearing
-    if not case.baud or hearing.seconds < _LONG_ENOUGH:
+    if not case.baud or hearing.seconds < _MIN_DURATION_S:
         return
     rate = hearing.octets / hearing.seconds
     share = 10.0 * rate / case.baud
     room = case.baud / 10.0 - rate
     what = f"{rate / 1e3:.1f} kB/s of {case.baud / 1e4:.1f} ({share:.0%} of the port) are taken"
-    if room < _WANTED:
+    if room < _FLY_BYTES_PER_S:
         yield Finding(
             what,
             Severity.WARNING,
-            f"Position and attitude as fly asks for them take {_WANTED / 1e3:.1f} kB/s more: messages "
-            "will be late.",
-            "Set 921600 baud (SERIALn_BAUD, SER_TEL1_BAUD), or have less streamed there (SRn_…, MAV_n_MODE).",
+            f"Position and attitude at the rates that fly asks for need {_FLY_BYTES_PER_S / 1e3:.1f} kB/s: "
+            "messages will be late.",
+            "Set 921600 baud (SERIALn_BAUD, SER_TEL1_BAUD), or reduce its streams (SRn_…, MAV_n_MODE).",
         )
     else:
         yield Finding(what, Severity.OK, "There is room for what fly asks for.")

@@ -22,10 +22,10 @@ from outrider.terminal.share_progress import share_progress
 
 
 class Result(NamedTuple):
-    """Result of an export: the files written, and the records that could not be read.
+    """Result of an export: the files written, and the data left out.
 
-    The latter are damaged records of logs, messages that the dialect does not define, and one line for each
-    file that is not a readable log (``unread_logs``).
+    ``out_of_order``: messages that would go back in time; ``damaged_records`` of logs; ``unknown_messages``:
+    messages that the dialect does not define; ``unread_logs``: a line for each file that is no readable log.
     """
 
     format: str

@@ -1,4 +1,4 @@
-"""JSON Schemas of those Foxglove messages that the export uses.
+"""JSON Schemas of the Foxglove messages that the export uses.
 
 Names and fields are those of https://docs.foxglove.dev/docs/sdk/schemas.
 """
@@ -18,42 +18,44 @@ from outrider.export.json_schema import (
     words,
 )
 
-_STAMP = struct("when", sec=integer("s"), nsec=integer("ns"))
+_STAMP = struct("time", sec=integer("s"), nsec=integer("ns"))
+_DURATION = struct("duration", sec=integer("s"), nsec=integer("ns"))
 _XYZ = struct("m", x=number(), y=number(), z=number())
-_TURN = struct("quaternion", x=number(), y=number(), z=number(), w=number())
-_POSE = struct("where and how it lies", position=_XYZ, orientation=_TURN)
-_COLOR = struct("each from 0 to 1", r=number(), g=number(), b=number(), a=number())
-_PAIR = struct("something more about it", key=words(), value=words())
+_RATIOS = struct("scale factor along each axis", x=number(), y=number(), z=number())
+_QUATERNION = struct("quaternion", x=number(), y=number(), z=number(), w=number())
+_POSE = struct("position and orientation in the frame", position=_XYZ, orientation=_QUATERNION)
+_COLOR = struct("colour and opacity, each from 0 to 1", r=number(), g=number(), b=number(), a=number())
+_PAIR = struct("additional information", key=words(), value=words())
 _POINTS = many(_XYZ)
 _COLORS = many(_COLOR)
 _INDICES = many(integer())
 
 FRAME_TRANSFORMS: Final = schema(
     "foxglove.FrameTransforms",
-    "where frames are",
+    "coordinate transforms between frames",
     transforms=many(
         struct(
-            "one frame in another",
+            "pose of the child frame in the parent frame",
             timestamp=_STAMP,
             parent_frame_id=words(),
             child_frame_id=words(),
             translation=_XYZ,
-            rotation=_TURN,
+            rotation=_QUATERNION,
         )
     ),
 )
 
 _ENTITY = struct(
-    "something to be seen",
+    "object in the 3D scene",
     timestamp=_STAMP,
-    frame_id=words("the frame that it is given in"),
-    id=words("what comes later under the same name takes its place"),
-    lifetime=_STAMP,
-    frame_locked=flag("whether it moves along with its frame"),
+    frame_id=words("frame of reference of its poses"),
+    id=words("a later entity with the same id on the same topic replaces this one"),
+    lifetime=_DURATION,
+    frame_locked=flag("whether the entity moves with its frame"),
     metadata=many(_PAIR),
     arrows=many(
         struct(
-            "from its tail along x",
+            "arrow along x of its pose, from the tail; m",
             pose=_POSE,
             shaft_length=number(),
             shaft_diameter=number(),
@@ -62,25 +64,25 @@ _ENTITY = struct(
             color=_COLOR,
         )
     ),
-    cubes=many(struct("a box", pose=_POSE, size=_XYZ, color=_COLOR)),
-    spheres=many(struct("a ball, by its diameters", pose=_POSE, size=_XYZ, color=_COLOR)),
+    cubes=many(struct("box", pose=_POSE, size=_XYZ, color=_COLOR)),
+    spheres=many(struct("sphere or ellipsoid; size: its diameters", pose=_POSE, size=_XYZ, color=_COLOR)),
     cylinders=many(
         struct(
-            "along z",
+            "cylinder or cone along z of its pose",
             pose=_POSE,
             size=_XYZ,
-            bottom_scale=number("0 to 1"),
-            top_scale=number("0 to 1"),
+            bottom_scale=number("ratio of the bottom's diameter to size, 0 to 1"),
+            top_scale=number("ratio of the top's diameter to size, 0 to 1"),
             color=_COLOR,
         )
     ),
     lines=many(
         struct(
-            "points that are joined",
-            type=choice("how", LINE_STRIP=0, LINE_LOOP=1, LINE_LIST=2),
+            "line through points",
+            type=choice("connection of the points", LINE_STRIP=0, LINE_LOOP=1, LINE_LIST=2),
             pose=_POSE,
             thickness=number(),
-            scale_invariant=flag("whether the thickness is in pixels"),
+            scale_invariant=flag("whether the thickness is in pixels (true) or m (false)"),
             points=_POINTS,
             color=_COLOR,
             colors=_COLORS,
@@ -88,26 +90,26 @@ _ENTITY = struct(
         )
     ),
     triangles=many(
-        struct("a mesh", pose=_POSE, points=_POINTS, color=_COLOR, colors=_COLORS, indices=_INDICES)
+        struct("triangle mesh", pose=_POSE, points=_POINTS, color=_COLOR, colors=_COLORS, indices=_INDICES)
     ),
     texts=many(
         struct(
-            "a label",
+            "text label",
             pose=_POSE,
-            billboard=flag("whether it always faces who looks"),
+            billboard=flag("whether the text always faces the camera"),
             font_size=number(),
-            scale_invariant=flag("whether the size is in pixels"),
+            scale_invariant=flag("whether the font size is in pixels (true) or m (false)"),
             color=_COLOR,
             text=words(),
         )
     ),
     models=many(
         struct(
-            "a model",
+            "3D model, from a file",
             pose=_POSE,
-            scale=_XYZ,
+            scale=_RATIOS,
             color=_COLOR,
-            override_color=flag(),
+            override_color=flag("whether color replaces the model's own colours"),
             url=words(),
             media_type=words(),
         )
@@ -116,12 +118,14 @@ _ENTITY = struct(
 
 SCENE_UPDATE: Final = schema(
     "foxglove.SceneUpdate",
-    "what there is to be seen",
+    "changes of the 3D scene",
     deletions=many(
         struct(
-            "what goes away",
+            "deletion of entities",
             timestamp=_STAMP,
-            type=choice("which", MATCHING_ID=0, ALL=1),
+            type=choice(
+                "entities to delete: the one with this id, or all of the topic", MATCHING_ID=0, ALL=1
+            ),
             id=words(),
         )
     ),
@@ -130,25 +134,25 @@ SCENE_UPDATE: Final = schema(
 
 LOCATION_FIX: Final = schema(
     "foxglove.LocationFix",
-    "where a vehicle says it is",
+    "position that a vehicle reports",
     timestamp=_STAMP,
     frame_id=words(),
     latitude=number("deg"),
     longitude=number("deg"),
     altitude=number("m"),
-    position_covariance=many(number(), "m², ENU, by rows", 9),
+    position_covariance=many(number(), "3 × 3 matrix, m², ENU, row by row", 9),
     position_covariance_type=choice(
-        "what is known of it", UNKNOWN=0, APPROXIMATED=1, DIAGONAL_KNOWN=2, KNOWN=3
+        "known part of the covariance", UNKNOWN=0, APPROXIMATED=1, DIAGONAL_KNOWN=2, KNOWN=3
     ),
 )
 
 LOG: Final = schema(
     "foxglove.Log",
-    "what a vehicle says in words",
+    "text message of a vehicle",
     timestamp=_STAMP,
-    level=choice("how bad it is", UNKNOWN=0, DEBUG=1, INFO=2, WARNING=3, ERROR=4, FATAL=5),
+    level=choice("severity", UNKNOWN=0, DEBUG=1, INFO=2, WARNING=3, ERROR=4, FATAL=5),
     message=words(),
-    name=words("who"),
+    name=words("sender"),
     file=words(),
     line=integer(),
 )

@@ -26,8 +26,8 @@ sender's system and component id.
 """
 _HEAD = Struct("<qBBBB")
 _HEAD_TYPES = [("time_us", "<i8"), ("log", "u1"), ("link", "u1"), ("system", "u1"), ("component", "u1")]
-_ROWS: Final = 32_768
-_BYTES: Final = 32 << 20
+_PART_ROWS: Final = 32_768
+_MAX_BUFFER_BYTES: Final = 32 << 20
 """Total size of the buffered rows of all tables at which they are written."""
 
 
@@ -48,9 +48,9 @@ class Heap:
         row = _HEAD.pack(spoken.time, owner, spoken.link, spoken.system, spoken.component) + spoken.payload
         rows.append(row)
         self._bytes += len(row)
-        if self._bytes >= _BYTES:
+        if self._bytes >= _MAX_BUFFER_BYTES:
             yield from self.rest()
-        elif len(rows) >= _ROWS:
+        elif len(rows) >= _PART_ROWS:
             self._bytes -= sum(map(len, rows))
             yield _part(*key, self._waiting.pop(key))
 

@@ -30,7 +30,7 @@ FLEET: Final = "fleet"
 BYSTANDER, TARGET, SOLID, SHELL = Color(0.6, 0.6, 0.6), Color(1.0, 0.8, 0.1), Color(0.45, 0.4, 0.38), 0.12
 TRAIL_US, TRAIL_EVERY_US, TRAIL_POINT = 10_000_000, 200_000, 5
 """Length of a trail (µs), its drawing period (µs), and the stride of its samples."""
-_NOT_TURNED = (1.0, 0.0, 0.0, 0.0)
+_IDENTITY = (1.0, 0.0, 0.0, 0.0)
 _SPAN = 0.6
 """Span (m) of a vehicle whose file is not available."""
 
@@ -83,9 +83,9 @@ def frames(stage: Stage) -> Iterator[Entry]:
     names = [f"vehicle-{system}" for system in scenario.systems]
     for row, time in enumerate(motion.time.tolist()):
         found = [(name, motion.position[row, k], turned[k][row].tolist()) for k, name in enumerate(names)]
-        found.append(("target", motion.target[row], _NOT_TURNED))
+        found.append(("target", motion.target[row], _IDENTITY))
         found += [
-            (f"moving-{system}", motion.moving[row, k], _NOT_TURNED)
+            (f"moving-{system}", motion.moving[row, k], _IDENTITY)
             for k, system in enumerate(scenario.moving_systems)
         ]
         there = [

@@ -21,25 +21,25 @@ MOTION: Final = schema(
     "the true motion of a vehicle",
     position=enu("m"),
     velocity=enu("m/s"),
-    reference=enu("m, what its autopilot flies to"),
-    off_reference=number("m, from there to where it truly is"),
+    reference=enu("m, reference position of its autopilot"),
+    off_reference=number("m, distance of the true position from the reference"),
     yaw=number("rad counter-clockwise from east"),
     tilt=number("rad from upright"),
 )
-PLACE: Final = schema("outrider.Place", "where something truly is", position=enu("m"))
+PLACE: Final = schema("outrider.Place", "true position of the target or a moving obstacle", position=enu("m"))
 SEPARATION: Final = schema(
     "outrider.Separation",
-    "how near vehicles came to each other",
+    "least separation of vehicles",
     separation=number("m between centres, the least of any pair since the sample before"),
-    d_min=number("m, below which it is a violation"),
+    d_min=number("m, limit of the separation"),
 )
 PLAN: Final = schema(
     "outrider.Plan",
     "a plan of a vehicle",
     gradient=enu("m, ∇J divided by Ω_t"),
-    gradient_norm=number("m, near 0 where the vehicle is done"),
+    gradient_norm=number("m, near 0 when the vehicle has converged"),
 )
-PLAN_TIME: Final = schema("outrider.PlanTime", "what a plan took", plan_ms=number("ms of CPU time"))
+PLAN_TIME: Final = schema("outrider.PlanTime", "computation time of a plan", plan_ms=number("ms of CPU time"))
 _AXES = ("east", "north", "up")
 
 

@@ -87,19 +87,19 @@ def _write(
     vehicles = _vehicles(log, found)
     kinds = sorted(found.kinds, key=lambda kind: kind.id)
     with ExitStack() as files:
-        books = {
+        converters = {
             system: _VehicleConverter(
                 files.enter_context(_file(folder, system, zero, kinds)), system, zero, log.owner is not None
             )
             for system in vehicles
         }
         for spoken in messages:
-            if len(books) == 1 or spoken.system not in books:
-                for book in books.values():
-                    book.add(spoken)
+            if len(converters) == 1 or spoken.system not in converters:
+                for converter in converters.values():
+                    converter.add(spoken)
             else:
-                books[spoken.system].add(spoken)
-        written = [book.file for book in books.values()]
+                converters[spoken.system].add(spoken)
+        written = [converter.file for converter in converters.values()]
         return [Written(file.subscriptions, file.messages, file.out_of_order) for file in written]
 
 

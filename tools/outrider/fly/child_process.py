@@ -1,4 +1,4 @@
-"""Child process that flies, as seen by its parent."""
+"""Parent's handle of the child process that runs the companion."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Final
 
 from outrider.fly.worker import Worker
 
-FAREWELL: Final = 10.0
-"""Time limit for the child to write its files (s)."""
-KILLED: Final = 1.0
+EXIT_TIMEOUT_S: Final = 10.0
+"""Time limit for the child to write its files and end (s)."""
+KILL_TIMEOUT_S: Final = 1.0
 """Time limit for a killed child to end (s).
 
-After that it is blocked in the kernel, waiting for a disk, and no longer flies.
+A process that still exists then is probably blocked in the kernel by a disk; it executes no more code.
 """
 
 
@@ -42,19 +42,23 @@ class ChildProcess:
 
     @property
     def killed(self) -> bool:
-        """Whether the process has been killed, and so sends nothing more."""
+        """Whether ``kill`` was called; the process may not have ended yet."""
         return self._killed
 
     def kill(self) -> None:
-        """Kill the process immediately."""
+        """Send SIGKILL to the process, without waiting for its end."""
         self._killed = True
         self._process.kill()
 
     def join(self) -> None:
-        """Wait until the process has ended; kill it if it takes longer than ``FAREWELL``."""
+        """Wait until the process has ended; kill it if it takes longer than ``EXIT_TIMEOUT_S``.
+
+        After ``kill``, here or earlier, wait at most ``KILL_TIMEOUT_S``; return even if the process has not
+        ended.
+        """
         if not self._killed:
-            self._process.join(FAREWELL)
+            self._process.join(EXIT_TIMEOUT_S)
             if not self._process.is_alive():
                 return
             self.kill()
-        self._process.join(KILLED)
+        self._process.join(KILL_TIMEOUT_S)

@@ -41,9 +41,10 @@ _SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 def run(asked: Request) -> int:
     """Fly until the vehicle has landed, a signal ends the program or the time limit ends.
 
-    Returns the exit status. The signals are SIGINT, SIGTERM, SIGHUP and SIGQUIT. If the request names a log,
-    a shadow run of that log is made instead. Raises InputError if a link or file cannot be opened, or if the
-    autopilot is not that of the own vehicle.
+    Returns the exit status, ``FAULT`` after a fault. The signals are SIGINT, SIGTERM, SIGHUP and SIGQUIT; the
+    operator's ``quit`` ends the flight too. If the request names a log, make a shadow run of it instead.
+    Raises InputError if a link or file cannot be opened, if another process flies the vehicle, or if the
+    autopilot is not the own vehicle's.
     """
     if asked.log is not None:
         from outrider.fly.shadow_run import dry_run_of_log
@@ -113,7 +114,7 @@ def _flown(
 
 @contextmanager
 def _suspending_signals_ignored() -> Iterator[None]:
-    """Ignore the suspending signals: a suspended process would leave the vehicle on its last set-point."""
+    """Ignore the suspending signals: a suspended process could neither relay orders nor request a hold."""
     before = {which: signal.signal(which, signal.SIG_IGN) for which in _SUSPENDING}
     try:
         yield

@@ -23,17 +23,18 @@ _SENTENCES: Final = {
 }
 
 
-_MOST: Final = 10_000
+_MAX_WAITING_LINES: Final = 10_000
 """Maximum number of lines that wait for the disk; further lines are dropped."""
-_PATIENCE: Final = 5.0
+_WRITE_TIMEOUT_S: Final = 5.0
 """Time limit for writing the remaining lines at the end (s)."""
 
 
 class EventLog:
     """Event log that a thread writes to ``events.jsonl`` in ``directory``.
 
-    ``tell`` receives the lines of text. ``phases`` holds each phase with its start time (s), ``concerns`` the
-    number of times each concern began. A full or blocked disk, or a closed terminal, never blocks the caller.
+    ``tell`` receives the lines of text. ``phases``: each phase with its start time (s). ``concerns``: how
+    often each concern or critical event occurred. A full or blocked disk, or a closed terminal, never blocks
+    the caller.
     """
 
     def __init__(self, directory: Path, clock: Callable[[], float]) -> None:
@@ -42,7 +43,7 @@ class EventLog:
         self.concerns: Counter[str] = Counter()
         self.tell: Callable[[str], None] = lambda _line: None
         self._clock = clock
-        # Unbuffered: a process forked meanwhile would inherit the lock of a buffer.
+        # Unbuffered: a process forked during a write would inherit a locked buffer.
         self._file = os.open(directory / NAME, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
         self._lines: SimpleQueue[bytes | None] = SimpleQueue()
         self._writer = Thread(target=self._write, name="diary", daemon=True)
@@ -59,16 +60,16 @@ class EventLog:
         elif what in ("concern", "critical"):
             self.concerns[text] += 1
         event = {"wall_s": now, "clock_s": at, "what": what, "text": text}
-        if self._lines.qsize() < _MOST:
+        if self._lines.qsize() < _MAX_WAITING_LINES:
             line = json.dumps(event, ensure_ascii=False) + "\n"
             self._lines.put(line.encode("utf-8", "replace"))
         with suppress(OSError, ValueError):
             self.tell(f"{now:8.1f} s  {_SENTENCES.get(what, '{}').format(text)}")
 
     def close(self) -> None:
-        """Finish the file, if the disk allows it; no event may be noted afterwards."""
+        """Write the rest, for at most 5 s; no event may be noted afterwards."""
         self._lines.put(None)
-        self._writer.join(_PATIENCE)
+        self._writer.join(_WRITE_TIMEOUT_S)
 
     def _write(self) -> None:
         """Write queued lines to the file (thread body)."""

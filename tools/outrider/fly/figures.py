@@ -14,7 +14,7 @@ _NUMBER = 1
 def summary(flight: Flight, directory: Path) -> dict[str, object]:
     """Return the summary as one JSON object.
 
-    Fields known to the worker alone are absent if it was killed; its last report is in ``state``.
+    The fields that the worker reports when it ends are absent if it was killed; ``state`` is its last state.
     """
     asked, state, event_log = flight.asked, flight.state, flight.event_log
     profile = None if state.beat is None else KNOWN.get(state.beat[_NUMBER])

@@ -1,10 +1,10 @@
-"""One flight, seen by the supervising parent process.
+"""Supervision of one flight by the parent process.
 
 The parent identifies the autopilot, starts the child that flies, forwards orders to it, and asks the
 autopilot to hold when the child ends, for whatever reason.
 
-If the child ended without an order, another child follows. It does not fly without a new go, but tells the
-other companions the position of the vehicle that holds its place among them.
+If the child ends unasked, another child follows. It does not fly without a new go, but shares the position of
+the holding vehicle with the other companions.
 """
 
 from __future__ import annotations
@@ -47,16 +47,17 @@ LOOK: Final = 0.05
 MOST: Final = 5
 WITHIN: Final = 60.0
 """``MOST`` processes lost within ``WITHIN`` seconds end the flight."""
-_LEAVING: Final = 2.0
+_STOP_TIMEOUT_S: Final = 2.0
 """Time limit for the child to stop flying after the stop request (s)."""
-_QUICK: Final = 0.01
+_STOP_POLL_S: Final = 0.01
 
 
 class Flight:
     """Supervisor of one flight.
 
-    ``look`` is called some times a second with the latest ``state``. ``stops`` lists the signals received so
-    far: the first one ends the flight, one that comes a second or more later ends it at once.
+    ``look`` is called about 20 times a second; ``state`` is the latest one. ``stops``: the signals received
+    so far. The first ends the flight; after another one, at least a second later, the child is killed at
+    once.
     """
 
     def __init__(
@@ -86,7 +87,7 @@ class Flight:
         self._began = time.monotonic()
         self._watchdog = Watchdog(self._began)
         self.landing = Landing(False, None)
-        """Last landing, if the flight ended on the ground."""
+        """Last landing; before the first, one without a return and with an unknown position."""
         self._left = self._go_given = self._failed = self._elsewhere = False
         self._trouble = ""
         self._simulated: bool | None = None
@@ -94,8 +95,8 @@ class Flight:
     def run(self) -> None:
         """Run the flight from the first heartbeat to the end.
 
-        Afterwards ``ended`` gives the reason, ``fault`` whether it counts as a fault. Raises InputError for
-        an autopilot that is not the own one.
+        Afterwards ``ended`` gives the reason, ``fault`` whether it is a fault. Raises InputError if the
+        autopilot is not the own vehicle's or not supported.
         """
         place = self._directory
         child, desk, orders = self._child(place)
@@ -112,8 +113,8 @@ class Flight:
                 self._look_after(desk, child)
             finally:
                 self._finish(desk, child)
-                # Not earlier: once no process has this end open, the next beat discards the messages that
-                # wait at the parent's end.
+                # Not earlier: when no process has this end open, the parent's next send fails and the kernel
+                # discards the messages that wait at the parent's end.
                 orders.release()
             if self._over():
                 self.fault = self.fault or self._failed or self._elsewhere
@@ -122,8 +123,8 @@ class Flight:
             if self._signing is not None:
                 self._signing.resume(self.state.stamp)
             if self.state.simulated is not None:
-                # The rate is known from the previous process: the next one need not be silent while it
-                # measures again.
+                # The kind of clock is known from the previous process: the next one need not identify it
+                # before it sends.
                 self._simulated = self.state.simulated
             self.state, self.waiting = State(), ""
             child, desk, orders = self._child(place)
@@ -173,14 +174,14 @@ class Flight:
                 return
             if self._watchdog.stopped(time.monotonic()):
                 child.kill()
-                self._lose("its process is not heard any more")
+                self._lose("its process sends no more messages")
                 return
             if self.state.phase == Phase.DONE.value and not self.ended:
                 landing = self.landing
                 self.ended, self._elsewhere = verdict(landing.off, returning=landing.returning)
 
     def _over(self) -> bool:
-        """Return whether the flight is over; ``ended`` gives the reason."""
+        """Return whether the flight is over; set ``ended`` to the reason after a signal or the time limit."""
         if not self.ended and self._stops:
             self.ended = f"stopped by {signal.Signals(self._stops[0].which).name}"
         if not self.ended and self.asked.seconds is not None and self.seconds >= self.asked.seconds:
@@ -188,7 +189,7 @@ class Flight:
         return bool(self.ended)
 
     def _lose(self, why: str) -> None:
-        """Record the loss of the flying process. Another one follows, unless too many were lost recently."""
+        """Record the loss of the flying process; end the flight if too many were lost recently."""
         why = self._trouble or why
         self._trouble = ""
         now = self.seconds
@@ -223,9 +224,9 @@ class Flight:
                 self._left = True
 
     def _obey(self, desk: Channel | None) -> None:
-        """Execute typed orders, and the go that was given on the command line.
+        """Execute typed orders, and the option ``--go`` as soon as the companion waits for it.
 
-        Without a ``desk`` no process flies yet.
+        ``desk`` is None while no process flies yet.
         """
         for line in self._typed.lines():
             word, answer = understood(line)
@@ -253,15 +254,15 @@ class Flight:
 
     def _order(self, word: str, desk: Channel) -> None:
         if self._signing is not None:
-            # Not older than the newest stamp the companion has received: a simulation's time may run ahead of
-            # the wall's.
+            # Not older than the newest stamp of the companion: a simulation's time may be ahead of the wall
+            # clock.
             self._signing.resume(self.state.stamp)
             self._signing.present(self._wall.now())
         self.event_log.note("order", word)
         desk.order(self._orders.frame(word))
 
     def _finish(self, desk: Channel, child: ChildProcess) -> None:
-        """End the flying process; then, whatever happens meanwhile, ask the vehicle to hold."""
+        """End the flying process; then ask the autopilot to hold, even after an exception."""
         try:
             self._dismiss(desk, child)
         finally:
@@ -277,14 +278,14 @@ class Flight:
         if child.killed:
             child.join()
             return
-        until = time.monotonic() + _LEAVING
+        until = time.monotonic() + _STOP_TIMEOUT_S
         while not (self._left or child.status is not None):
             if self._at_once() or time.monotonic() > until:
                 child.kill()
                 child.join()
                 self.event_log.note("process", "the companion's process does not end: killed")
                 return
-            wait([desk.fileno(), child.sentinel], _QUICK)
+            wait([desk.fileno(), child.sentinel], _STOP_POLL_S)
             self._receive(desk)
 
     def _at_once(self) -> bool:
@@ -303,4 +304,4 @@ class Flight:
         self.last_word, self._failed = word.said, word.failed
         self.event_log.note("last word", f"the vehicle: {word.said or 'asked to hold, no answer yet'}")
         if word.failed:
-            self.event_log.note("critical", "the vehicle is armed and nobody has it: take it over")
+            self.event_log.note("critical", "the vehicle is armed and nothing controls it: take it over")

@@ -13,16 +13,16 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 from outrider.errors import InputError
 
-_BEAT = 1_000_000
-_PATIENCE = 60_000_000
-"""Time for which only other vehicles may be received (µs): the own autopilot may boot last."""
+_HEARTBEAT_PERIOD_US = 1_000_000
+_OTHERS_ONLY_TIMEOUT_US = 60_000_000
+"""Time limit for the own heartbeat after another vehicle's first one (µs): the own one may boot last."""
 
 
 class Identification:
     """Search for the own vehicle's heartbeat, polled until it succeeds.
 
-    ``link`` is the physical link, on which all vehicles are received; ``own`` is the sender of the own
-    heartbeats, with the system id of the own vehicle.
+    ``link``: the physical link, on which all vehicles are received. ``own``: sender of the heartbeats that
+    this search sends; its system id is the own vehicle's.
     """
 
     def __init__(self, link: Link, endpoint: str, own: Source, signing: Signing | None) -> None:
@@ -39,17 +39,17 @@ class Identification:
         self._next = 0
 
     def look(self, now: int) -> Heartbeat | None:
-        """Return the own vehicle's heartbeat, None before one is received; ``now``: wall time (µs).
+        """Return the own vehicle's heartbeat, None if none has arrived; ``now``: wall time (µs).
 
-        Raises InputError if only other vehicles are received for 60 s, or if the autopilot is of an unknown
-        kind.
+        Raises InputError if only other vehicles are received for 60 s, or if the own autopilot is not
+        supported.
         """
         if self._signing is not None:
             self._signing.present(now)
         if now >= self._next:
             # Routers and autopilots that wait for a first message learn the return address from this
             # heartbeat.
-            self._next = now + _BEAT
+            self._next = now + _HEARTBEAT_PERIOD_US
             self._link.send(self._codec.encode(onboard_heartbeat(self._own)))
         for data in self._link.receive():
             for message in self._codec.feed(data, whole=True):
@@ -58,13 +58,13 @@ class Identification:
                         return self._known(message)
                     self._others[message.source.system] = message
                     self._since = now if self._since is None else self._since
-        if self._since is not None and now - self._since > _PATIENCE:
+        if self._since is not None and now - self._since > _OTHERS_ONLY_TIMEOUT_US:
             raise InputError(self._mismatch())
         return None
 
     @property
     def waiting(self) -> str:
-        """Description of the missing heartbeat, with the other systems received so far."""
+        """Description of the missing heartbeat, with the systems received and the count of refused frames."""
         refused = self._codec.counters.refused
         unsigned = f"; {refused} heartbeats there are not signed with the key" if refused else ""
         others = f"; heard there: {', '.join(map(str, sorted(self._others)))}" if self._others else ""

@@ -1,7 +1,7 @@
 """Instance lock: one companion per vehicle on one computer; a second one at the same endpoint is refused.
 
 The lock is a file in a folder of the user. Its name depends on the network namespace, because the same port
-in another namespace is another place; a serial port is the same in all namespaces.
+in another namespace is another endpoint; a serial port is the same in all namespaces.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from typing import Final
 from mavlink_bridge.links.endpoints import Endpoint, Serial
 from outrider.errors import InputError
 
-_LONGEST: Final = 200
+_MAX_COMMAND_CHARACTERS: Final = 200
 """Longest part of a command line that is shown (characters)."""
-_DIGITS: Final = 10
+_MAX_PID_DIGITS: Final = 10
 """Maximum number of digits of a process id."""
 
 
@@ -32,7 +32,7 @@ def instance_lock(system: int, endpoint: Endpoint) -> Iterator[None]:
     """Hold the lock of vehicle ``system`` at ``endpoint``.
 
     This process and the processes that it forks hold it until the last of them has ended. Raises InputError,
-    which names the holder, if another process holds the lock. Without a place for the lock file there is no
+    which names the holder, if another process holds the lock. If the lock file cannot be opened, there is no
     lock.
     """
     place = "" if isinstance(endpoint, Serial) else _network()
@@ -41,7 +41,7 @@ def instance_lock(system: int, endpoint: Endpoint) -> Iterator[None]:
         path = _folder() / f"fly-{name}.lock"
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
     except OSError:
-        # A missing place for the lock file is no reason to stay on the ground.
+        # A lock file that cannot be opened is no reason not to fly.
         yield
         return
     try:
@@ -52,7 +52,7 @@ def instance_lock(system: int, endpoint: Endpoint) -> Iterator[None]:
                 f"--autopilot {endpoint}: another outrider fly has vehicle {system} there{_holder(file)}; "
                 "allowed: one for each vehicle, and any number with --dry-run"
             ) from None
-        _sign(file)
+        _write_holder(file)
         yield
     finally:
         os.close(file)
@@ -64,17 +64,17 @@ def _folder() -> Path:
     Raises OSError if another user owns the folder or may enter it.
     """
     given = os.environ.get("XDG_RUNTIME_DIR", "")
-    if os.path.isabs(given) and _own(Path(given)):
+    if os.path.isabs(given) and _is_private(Path(given)):
         folder = Path(given) / "outrider"
     else:
         folder = Path(tempfile.gettempdir()) / f"outrider-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)
-    if not _own(folder):
+    if not _is_private(folder):
         raise PermissionError(f"{folder} is not this user's alone")
     return folder
 
 
-def _own(folder: Path) -> bool:
+def _is_private(folder: Path) -> bool:
     """Return whether ``folder`` is a folder of this user that no other user may enter."""
     try:
         found = folder.lstat()
@@ -92,8 +92,8 @@ def _network() -> str:
     return f"{found.st_dev}:{found.st_ino}"
 
 
-def _sign(file: int) -> None:
-    """Write process id and command line of the holder. On a full disk only they are missing."""
+def _write_holder(file: int) -> None:
+    """Write process id and command line of the holder; on a full disk the lock holds without them."""
     program, *arguments = sys.argv or [""]
     with suppress(OSError):
         os.ftruncate(file, 0)
@@ -108,9 +108,11 @@ def _holder(file: int) -> str:
     except OSError:
         return ""
     number, _, command = said.partition(" ")
-    if not (number.isascii() and number.isdigit()) or len(number) > _DIGITS:
+    if not (number.isascii() and number.isdigit()) or len(number) > _MAX_PID_DIGITS:
         return ""
-    command = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in command)[:_LONGEST]
+    command = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in command)[
+        :_MAX_COMMAND_CHARACTERS
+    ]
     ended = "" if _alive(int(number)) else "a process that was started by "
     return f" ({ended}process {number}{f': {command}' if command else ''})"
 

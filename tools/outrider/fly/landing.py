@@ -1,16 +1,16 @@
-"""Report of a landing: the vehicle counts as back only if the position was measured."""
+"""Report of a landing: a returning vehicle counts as returned only if its position was measured."""
 
 from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-_THERE: Final = 1.5
+_MAX_LANDING_ERROR_M: Final = 1.5
 """Largest horizontal distance from its place that counts as landed there (m).
 
-Estimates and touch-down take as much.
+Estimation errors and drift at touch-down reach this.
 """
-_BESIDE: Final = 6.0
-"""Largest distance at which a vehicle lands beside a place that is taken (m)."""
+_MAX_DISPLACEMENT_M: Final = 6.0
+"""Largest distance from its place that is no fault (m): a vehicle lands beside an occupied place."""
 
 
 class Verdict(NamedTuple):
@@ -23,15 +23,15 @@ class Verdict(NamedTuple):
 def verdict(off: float | None, *, returning: bool) -> Verdict:
     """Return the verdict for a landed vehicle.
 
-    ``off`` is the distance (m) from the place to which it should have returned, None where it is unknown.
-    ``returning``: whether it was on its way back.
+    ``off``: horizontal distance (m) from the return position, None if unknown. ``returning``: whether the
+    vehicle was on its way back; otherwise any position is right.
     """
     if not returning:
         return Verdict("landed", False)
     if off is None:
         return Verdict("landed on its way back, where is not known", True)
-    if off <= _THERE:
+    if off <= _MAX_LANDING_ERROR_M:
         return Verdict("landed", False)
-    if off <= _BESIDE:
+    if off <= _MAX_DISPLACEMENT_M:
         return Verdict(f"landed, {off:.1f} m beside its place", False)
     return Verdict(f"landed on its way back, {off:.0f} m from its place", True)

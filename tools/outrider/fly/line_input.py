@@ -13,15 +13,15 @@ from typing import Final
 if sys.platform != "win32":
     import termios
 
-_CHUNK: Final = 1024
+_CHUNK_BYTES: Final = 1024
 _ERASE: Final = (b"\x7f", b"\x08")
-_LONGEST: Final = 200
+_MAX_LINE_BYTES: Final = 200
 FEW: Final = 10
 """Maximum number of lines returned at once."""
 
 
 class LineInput:
-    """Typed lines of standard input; ``fileno`` is its file descriptor, None without one."""
+    """Lines of an input; ``fileno``: its file descriptor, None if there is no input."""
 
     def __init__(self, fileno: int | None) -> None:
         self._fileno = fileno
@@ -34,7 +34,7 @@ class LineInput:
         return self._line.decode(errors="replace")
 
     def lines(self) -> list[str]:
-        """Return complete lines, at most ``FEW`` at a time and the rest at the next call.
+        """Return complete lines, at most ``FEW``; the next calls return the rest.
 
         The limit keeps an endless writer from blocking everything else.
         """
@@ -50,13 +50,13 @@ class LineInput:
             elif byte in _ERASE:
                 self._line = self._line[:-1]
             elif byte >= b" ":
-                self._line = (self._line + byte)[:_LONGEST]
+                self._line = (self._line + byte)[:_MAX_LINE_BYTES]
 
     def _read(self) -> bytes:
         if self._fileno is None or not select.select([self._fileno], [], [], 0)[0]:
             return b""
         try:
-            data = os.read(self._fileno, _CHUNK)
+            data = os.read(self._fileno, _CHUNK_BYTES)
         except OSError:
             # The terminal is no longer available: there is no more input.
             self._fileno = None

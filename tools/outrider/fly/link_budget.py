@@ -31,7 +31,7 @@ from outrider.errors import InputError
 SHARE: Final = 0.7
 """Usable share of a line's capacity.
 
-Half-duplex radios lose the rest to turnaround, headers and retransmission.
+Half-duplex radios use the rest for turnaround, headers and retransmission.
 """
 FLEET: Final = 8
 TARGET_HZ: Final = 5.0
@@ -55,9 +55,9 @@ _HEALTH: Final[tuple[Message, ...]] = (
     GpsRaw(_ONE, 1, 3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 9, 1.0, 1.0, 1.0, 1.0),
     EstimatorStatus(_ONE, 1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1),
 )
-"""ArduPilot's estimator message is shorter."""
+"""Health messages of PX4; ArduPilot's estimator message is shorter."""
 _USB: Final = "ttyACM"
-"""Name of USB serial devices, whose baud rate has no meaning."""
+"""Part of the name of USB serial devices, whose baud rate has no effect."""
 
 
 def said(config: CompanionConfig, signed: bool) -> float:
@@ -76,7 +76,7 @@ def said_by_target(signed: bool) -> float:
 
 
 def room(baud: int) -> float:
-    """Return the bytes per second that a shared line of ``baud`` carries, for all senders together."""
+    """Return the usable bytes per second of a shared line of ``baud``, for all senders together."""
     return SHARE * baud / _BITS
 
 
@@ -106,7 +106,7 @@ def doubts(endpoint: Endpoint, config: CompanionConfig, signed: bool) -> str:
 
 
 def steered(config: CompanionConfig, signed: bool) -> float:
-    """Return the bytes per second sent to an autopilot under control, without status texts."""
+    """Return the bytes per second of set-points and heartbeats to an autopilot under control."""
     setpoints = _size(_SETPOINT, signed) * _SECOND / config.rates.setpoint_us
     return setpoints + _size(_BEAT, signed)
 
@@ -119,9 +119,9 @@ def reported(signed: bool) -> float:
 
 
 def doubts_of_autopilot(endpoint: Endpoint, config: CompanionConfig, signed: bool, *, dry_run: bool) -> str:
-    """Return a warning about ``endpoint`` as autopilot link; empty if a radio of its baud rate has room.
+    """Return a warning about ``endpoint`` as autopilot link; empty if it is no serial radio or has room.
 
-    A dry run requires room for twice the autopilot's traffic: the second half is a ground station's.
+    A dry run requires room for twice the autopilot's traffic: a ground station uses as much.
     """
     if not isinstance(endpoint, Serial) or _USB in endpoint.device:
         return ""

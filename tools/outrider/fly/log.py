@@ -21,20 +21,20 @@ from outrider.runs.recorder import Recorder
 BATCH: Final = 16
 """Number of entries handed to the thread together: some hundredths of a second.
 
-The thread writes them within a fraction of a millisecond; it holds the interpreter lock (GIL) meanwhile.
+The thread holds the interpreter lock (GIL) while it writes them, for a fraction of a millisecond.
 """
 MAX_BATCHES: Final = 4096
 """Maximum number of waiting batches: a minute or two of a flight, about 20 MB."""
 WRITE_TIMEOUT_S: Final = 5.0
-"""Longest time (s) for which the end waits until all is written.
+"""Time limit (s) for writing the waiting entries at the end.
 
-It is shorter than the time that the process has for its end.
+It is shorter than the time limit of the process's end (``child_process.EXIT_TIMEOUT_S``).
 """
-_STILL: Final = "the disk does not respond"
+_DISK_BLOCKED: Final = "the disk does not respond"
 
 
 class _Entry(NamedTuple):
-    """Arguments of one call of the observer; without ``datagram``: the beginning of a step."""
+    """Arguments of one call of the observer; ``datagram`` is None at the beginning of a step."""
 
     now: int
     node: str
@@ -76,7 +76,7 @@ class Log:
         self._waiting.put(None)
         self._thread.join(self._timeout_s)
         if self._thread.is_alive():
-            self._end(_STILL)
+            self._end(_DISK_BLOCKED)
 
     def begin(self, now: int, node: str, /) -> None:
         """Record that a step of ``node`` begins at ``now`` (µs)."""
@@ -97,7 +97,7 @@ class Log:
         if self._waiting.qsize() >= MAX_BATCHES:
             # The waiting batches are still written, should the disk recover.
             self._waiting.put(None)
-            self._end(_STILL)
+            self._end(_DISK_BLOCKED)
 
     def _write(self) -> None:
         """Write queued entries, from opening the first file to closing the last (thread body)."""

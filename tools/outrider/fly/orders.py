@@ -14,7 +14,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 
 OPERATOR: Final[int] = mavlink.MAV_COMP_ID_MISSIONPLANNER
-"""Component id of the orders, used under the vehicle's own system id, which no ground station uses."""
+"""Component id of the orders' sender; its system id is the vehicle's, which no ground station uses."""
 QUIT = "quit"
 _COMMANDS = {
     "go": mavlink.MAV_CMD_NAV_TAKEOFF,
@@ -27,7 +27,7 @@ _NAN = float("nan")
 
 
 class Orders:
-    """Encoder of orders as frames; ``height``: take-off height above ground (m); ``signing``: of its own."""
+    """Encoder of orders as frames; ``height``: take-off height above ground (m); ``signing``: may be None."""
 
     def __init__(self, system: int, height: float, signing: Signing | None = None) -> None:
         self._system, self._height = system, height

@@ -1,6 +1,6 @@
-"""Inter-process channel between the flying child and its parent: orders one way, status the other.
+"""Inter-process channel between the flying child and its parent: orders to the child, status to the parent.
 
-It never blocks; what the receiver has no room for is lost.
+Neither end ever blocks; a message that does not fit into the socket's buffer is lost.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from mavlink_bridge.messages import CommandAck
 from mavlink_bridge.wire.codec import Codec
 from outrider.fly.orders import OPERATOR
 
-_MOST: Final = 65536
+_MAX_DATAGRAM_BYTES: Final = 65536
 _STOP: Final = b"stop"
 _BEAT: Final = b"beat"
-ALONE: Final = 5.0
-"""Time without a beat after which the child acts alone (s).
+PARENT_TIMEOUT_S: Final = 5.0
+"""Time without a message from the parent after which the child counts the parent as lost (s).
 
-No parent then forwards orders or sends the hold request at the end.
+A lost parent forwards no orders and sends no hold request at the end.
 """
-_BETWEEN: Final = 0.5
+_BEAT_PERIOD_S: Final = 0.5
 """Time between two beats (s)."""
-_BUFFER: Final = 1 << 20
+_BUFFER_BYTES: Final = 1 << 20
 
 
 def intercom() -> tuple[Channel, OrderLink]:
@@ -36,7 +36,7 @@ def intercom() -> tuple[Channel, OrderLink]:
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     for end in (there, here):
         end.setblocking(False)
-        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER_BYTES)
     return Channel(there), OrderLink(here)
 
 
@@ -45,12 +45,12 @@ class Channel:
 
     def __init__(self, end: socket.socket) -> None:
         self._end = end
-        self._beaten = 0.0
+        self._last_beat = 0.0
 
     def beat(self, now: float) -> None:
-        """Report at ``now`` (s) that the parent is alive; at most two beats a second are sent."""
-        if now - self._beaten >= _BETWEEN:
-            self._beaten = now
+        """Tell the child at ``now`` (s) that the parent is alive; sends at most two beats a second."""
+        if now - self._last_beat >= _BEAT_PERIOD_S:
+            self._last_beat = now
             self._put(_BEAT)
 
     def fileno(self) -> int:
@@ -67,7 +67,7 @@ class Channel:
 
     def news(self) -> Iterator[dict[str, Any]]:
         """Yield the child's messages since the last call."""
-        while (data := _taken(self._end)) is not None:
+        while (data := _received_from(self._end)) is not None:
             yield json.loads(data)
 
     def close(self) -> None:
@@ -75,7 +75,7 @@ class Channel:
         self._end.close()
 
     def _put(self, data: bytes) -> None:
-        _given(self._end, data)
+        _send_to(self._end, data)
 
 
 class OrderLink:
@@ -96,14 +96,17 @@ class OrderLink:
 
     @property
     def alone(self) -> bool:
-        """Whether the parent has been silent for too long, counted from the first call."""
+        """Whether nothing came from the parent for ``PARENT_TIMEOUT_S`` s.
+
+        Before its first message the time counts from the first call.
+        """
         if self._contact is None:
             self._contact = self._clock()
-        return self._clock() - self._contact > ALONE
+        return self._clock() - self._contact > PARENT_TIMEOUT_S
 
     @property
     def counters(self) -> LinkCounters:
-        """Number of received orders."""
+        """Link counters: the number of received orders, and zeros."""
         return LinkCounters(self._received, 0, 0)
 
     def fileno(self) -> int:
@@ -113,7 +116,7 @@ class OrderLink:
     def receive(self) -> list[bytes]:
         """Return the orders received since the last call."""
         found = []
-        while (data := _taken(self._end)) is not None:
+        while (data := _received_from(self._end)) is not None:
             self._contact = self._clock()
             if data == _STOP:
                 self.stop = True
@@ -130,24 +133,24 @@ class OrderLink:
 
     def tell(self, **news: object) -> None:
         """Send a message to the parent."""
-        _given(self._end, json.dumps(news).encode())
+        _send_to(self._end, json.dumps(news).encode())
 
     def close(self) -> None:
-        """Do nothing: the end stays open until the process ends, as the last messages follow the loop."""
+        """Do nothing: the end stays open until the process ends, for the messages after the loop."""
 
     def release(self) -> None:
         """Close this end in the process that does not fly."""
         self._end.close()
 
 
-def _taken(end: socket.socket) -> bytes | None:
+def _received_from(end: socket.socket) -> bytes | None:
     try:
-        return end.recv(_MOST) or None
+        return end.recv(_MAX_DATAGRAM_BYTES) or None
     except OSError:
         return None
 
 
-def _given(end: socket.socket, data: bytes) -> None:
+def _send_to(end: socket.socket, data: bytes) -> None:
     try:
         end.send(data)
     except OSError:

@@ -1,4 +1,4 @@
-"""Read-only link: the final filter of a dry run, which passes nothing that changes a vehicle's behaviour."""
+"""Read-only link: last filter of a dry run; it sends only frames that do not affect a vehicle."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mavlink_bridge.links.link import Link, LinkCounters
 from mavlink_bridge.wire.framing import Frame, leading_frames
 from mavlink_bridge.wire.header import command_of
 
-_TELL: Final = frozenset(
+_HARMLESS: Final = frozenset(
     (
         mavlink.MAVLINK_MSG_ID_HEARTBEAT,
         mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
@@ -23,9 +23,9 @@ _TELL: Final = frozenset(
 
 
 class ReadOnlyLink:
-    """Wrapper of ``link`` that sends only status messages and requests for messages, parameters and time.
+    """Wrapper of ``link`` that sends only heartbeats, status, and requests for messages, parameters and time.
 
-    ``kept``: number of datagrams kept back.
+    ``kept``: number of dropped datagrams.
     """
 
     def __init__(self, link: Link) -> None:
@@ -46,7 +46,7 @@ class ReadOnlyLink:
         return self._link.receive()
 
     def send(self, data: bytes) -> None:
-        """Send ``data`` if all its frames are harmless; otherwise keep it back."""
+        """Send ``data`` if it consists of whole harmless frames; otherwise drop it."""
         frames, end = leading_frames(data)
         if end == len(data) and all(map(harmless, frames)):
             self._link.send(data)
@@ -62,4 +62,4 @@ def harmless(frame: Frame) -> bool:
     """Return whether ``frame`` leaves a vehicle's behaviour unchanged."""
     if frame.message_id == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
         return command_of(frame.payload).command in REQUESTS
-    return frame.message_id in _TELL
+    return frame.message_id in _HARMLESS

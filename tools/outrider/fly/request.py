@@ -42,8 +42,8 @@ class Options:
 class Request:
     """Checked request.
 
-    ``endpoints`` maps the companion's names of links to endpoints; several may be the same. ``log`` replaces
-    the autopilot and is for dry runs only.
+    ``endpoints`` maps the companion's link names to endpoints, of which several may be equal; it is empty if
+    ``log`` is given, the recorded flight of a dry run.
     """
 
     config: FlyConfig
@@ -65,7 +65,7 @@ class Request:
 
 
 def checked(options: Options) -> Request:
-    """Return the options as a request. Raises InputError, which names the fault and what is allowed."""
+    """Return the checked request. Raises InputError, which names the faulty option and allowed values."""
     config = load(find("companions", options.config), FlyConfig)
     if options.system is not None:
         if options.system == config.target:
@@ -80,7 +80,7 @@ def checked(options: Options) -> Request:
         return _of_log(options, config, Path(autopilot.path))
     if not config.system:
         raise InputError(
-            f"--system: is missing, and {options.config} says nothing of it; needed: the id of the own "
+            f"--system: is missing, here and in {options.config}; needed: the id of the own "
             "autopilot (SYSID_THISMAV, MAV_SYS_ID), 1…250, which no other vehicle may have"
         )
     if options.swarm is None:
@@ -135,7 +135,7 @@ def _of_log(options: Options, config: FlyConfig, log: Path) -> Request:
     for name in ("swarm", "target", "ground", "seconds", "signing_key"):
         if getattr(options, name) is not None:
             raise InputError(
-                f"--{name.replace('_', '-')}: does not go with a log, in which others are heard as well"
+                f"--{name.replace('_', '-')}: does not go with a log, which already contains all links"
             )
     return Request(config, options.config, {}, log, dry_run=True, out=options.out, as_json=options.as_json)
 
@@ -151,6 +151,6 @@ def _warn(endpoints: dict[str, Endpoint]) -> None:
     open_to_all = {str(one): None for one in endpoints.values() if exposed(one)}
     if open_to_all:
         sys.stderr.write(
-            f"outrider fly: {', '.join(open_to_all)}: beyond this machine; without --signing-key whoever can "
-            "send there is believed and obeyed\n"
+            f"outrider fly: {', '.join(open_to_all)}: reachable from other machines; without --signing-key, "
+            "data and orders of every sender there are accepted\n"
         )

@@ -26,7 +26,7 @@ _EVENTS: Final = 8
 class Screen:
     """Display on ``terminal``.
 
-    ``look`` may be called at any rate: nothing is drawn while the terminal takes no output. ``tell`` receives
+    ``look`` may be called at any rate. Nothing is drawn while the terminal takes no output. ``tell`` receives
     the lines of the event log.
     """
 

@@ -1,6 +1,6 @@
-"""Check of a sequence of set-points against the limits, one at a time and in little memory.
+"""Check of set-points against the limits, one at a time, in constant memory.
 
-The figures are those of ``outrider.shadow.setpoints``.
+The statistics are those of ``outrider.shadow.setpoints``.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from mavlink_bridge.messages import SetpointLocal, Vector
 
 TOGETHER = 100_000
 """Longest interval that counts as a step (µs); a longer one is a gap."""
-_IN_A_ROW = 35_000
-"""Longest interval over which yaw is compared (µs). After any pause yaw restarts at the vehicle's heading."""
+_MAX_YAW_INTERVAL_US = 35_000
+"""Longest interval over which yaw is compared (µs). After a longer pause yaw restarts at the heading."""
 
 
 class SetpointCheck:
     """Running statistics of set-points, fed with each set-point and its time (µs).
 
-    No set-point may be faster than ``fastest`` (m/s), accelerate harder than ``hardest`` (m/s²), turn faster
-    than ``turning`` (rad/s), or jump further than these limits explain.
+    Limits: speed ``fastest`` (m/s), acceleration ``hardest`` (m/s²), yaw rate ``turning`` (rad/s). A step of
+    position or yaw between two set-points may exceed limit × interval only by a tolerance.
     """
 
     def __init__(self, fastest: float, hardest: float, turning: float = inf) -> None:
@@ -37,7 +37,7 @@ class SetpointCheck:
         self._last: tuple[int, Vector, float] | None = None
 
     def take(self, now: int, message: SetpointLocal) -> None:
-        """Add a set-point that is sent, or would be sent, at ``now`` (µs)."""
+        """Add a set-point that is sent, or in a dry run would be sent, at ``now`` (µs)."""
         self.count += 1
         self.masks[message.type_mask] += 1
         self.frames[message.frame] += 1
@@ -54,7 +54,7 @@ class SetpointCheck:
                 step = dist(place, message.position)
                 self.step = max(self.step, step)
                 self.jump = max(self.jump, step - self._fastest * (now - before) * 1e-6)
-                if now - before <= _IN_A_ROW:
+                if now - before <= _MAX_YAW_INTERVAL_US:
                     swing = abs((message.yaw - yaw + pi) % (2.0 * pi) - pi)
                     self.swing = max(self.swing, swing - self._turning * (now - before) * 1e-6)
         self.spin = max(self.spin, abs(message.yaw_rate))
@@ -62,7 +62,7 @@ class SetpointCheck:
 
     @property
     def facts(self) -> dict[str, object]:
-        """Statistics for the summary."""
+        """Statistics for the summary; a maximum that is not finite is None."""
         largest = {
             "max_step_m": self.step,
             "max_speed_m_s": self.speed,
@@ -78,37 +78,37 @@ class SetpointCheck:
         }
 
     def faults(self, mask: int) -> list[str]:
-        """Return what is wrong with the set-points for an autopilot that expects type mask ``mask``."""
+        """Return the faults as text; the autopilot expects type mask ``mask``."""
         wrong = {
             "not all are finite": not self.finite,
             f"type masks other than 0x{mask:03X}": bool(set(self.masks) - {mask}),
             f"frames other than {mavlink.MAV_FRAME_LOCAL_NED}": bool(
                 set(self.frames) - {mavlink.MAV_FRAME_LOCAL_NED}
             ),
-            f"faster than {self._fastest:.1f} m/s": self.speed > self._fastest + _ROUNDED,
-            f"more than {self._hardest:.1f} m/s²": self.acceleration > self._hardest + _ROUNDED,
-            f"a jump of {self.jump:.2f} m": self.jump > _CORRECTED,
-            f"a jump of {self.swing:.2f} rad": self.swing > _TURNED,
-            f"turning faster than {self._turning:.1f} rad/s": self.spin > self._turning + _ROUNDED,
+            f"faster than {self._fastest:.1f} m/s": self.speed > self._fastest + _ROUNDING,
+            f"more than {self._hardest:.1f} m/s²": self.acceleration > self._hardest + _ROUNDING,
+            f"a jump of {self.jump:.2f} m": self.jump > _POSITION_STEP_TOLERANCE_M,
+            f"a jump of {self.swing:.2f} rad": self.swing > _YAW_STEP_TOLERANCE_RAD,
+            f"turning faster than {self._turning:.1f} rad/s": self.spin > self._turning + _ROUNDING,
         }
         return [what for what, is_so in wrong.items() if is_so]
 
 
-def gauge_for(
+def setpoint_check(
     limits: LimitsConfig, heading: HeadingConfig | None = None, compensation: float = 0.0
 ) -> SetpointCheck:
     """Return a check for a companion with these limits.
 
-    ``compensation`` (m/s²) may be added to the plan's acceleration. Without ``heading`` the yaw is not
-    checked, as it jumps where a flight continues after a pilot has turned the vehicle.
+    ``compensation`` (m/s²): maximum addition to the plan's acceleration. Without ``heading`` the yaw is not
+    checked, because it jumps when a flight continues after a pilot has turned the vehicle.
     """
     return SetpointCheck(
         hypot(*limits.v_max), limits.a_total + compensation, inf if heading is None else heading.rate_max
     )
 
 
-_ROUNDED = 1e-3
-_TURNED = 0.02
-"""Tolerance of yaw steps (rad): the own clock may run one hundredth faster or slower than the log's."""
-_CORRECTED = 0.15
+_ROUNDING = 1e-3
+_YAW_STEP_TOLERANCE_RAD = 0.02
+"""Tolerance of yaw steps (rad): the clock may run 1 % faster or slower than the log's."""
+_POSITION_STEP_TOLERANCE_M = 0.15
 """Tolerance of position steps (m): correction of the own position estimate between two set-points."""

@@ -1,4 +1,4 @@
-"""Shadow run fed by a log: what the companion would have sent, and what is wrong with it."""
+"""Shadow run fed by a log: the set-points that the companion would have sent, and their faults."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
 from outrider.fly.request import Request
-from outrider.fly.setpoint_check import gauge_for
-from outrider.fly.trajectory_comparison import likeness
+from outrider.fly.setpoint_check import setpoint_check
+from outrider.fly.trajectory_comparison import comparison
 from outrider.runs.directories import new_directory
 from outrider.shadow.findings import document_of, leave
 from outrider.shadow.roles import OwnRecords, Roles, survey
@@ -26,14 +26,15 @@ from outrider.shadow.shadow_run import ShadowRun, shadow_flight
 from outrider.terminal.lines import say
 from outrider.terminal.share_progress import share_progress
 
-_FAR: Final = 20_000.0
-"""Distance from the fleet origin (m) beyond which a flight is not one of this fleet."""
+_MAX_DISTANCE_M: Final = 20_000.0
+"""Maximum distance of the recorded vehicle from the fleet origin (m)."""
 
 
 def dry_run_of_log(asked: Request, log: Path) -> int:
-    """Replay the log at full speed and return the exit status: 0 for no fault, 1 for faulty set-points.
+    """Replay the log at full speed and return the exit status: 1 for faulty or no set-points, otherwise 0.
 
-    Raises InputError for a log without the vehicle, or from another place.
+    Raises InputError if the log is unreadable, or lacks the vehicle or its global position, or if the vehicle
+    is far from the fleet origin, or its autopilot is unknown.
     """
     config = asked.config
     try:
@@ -58,7 +59,7 @@ def dry_run_of_log(asked: Request, log: Path) -> int:
     except LogError as error:
         raise InputError(f"--autopilot: {error}") from None
     faults = _faults(asked, found, profile.setpoint_mask)
-    near = likeness(found)
+    near = comparison(found)
     document = {
         "system": config.system,
         "autopilot": profile.name,
@@ -75,11 +76,11 @@ def dry_run_of_log(asked: Request, log: Path) -> int:
         sys.stdout.write(json.dumps({**document, "run_dir": str(directory)}) + "\n")
     whom = f"target {target}"
     if target is None:
-        whom = f"a target that stands where it began, as {config.target} says no place there"
+        whom = f"a target below the vehicle's first position, as system {config.target} sends none"
     say(f"{log.name}: vehicle {config.system}, {profile.name}")
     say(f"{len(found.would)} set-points would have been sent, around {whom}")
     for words, steps in sorted(found.reasons.items(), key=lambda pair: -pair[1]):
-        say(f"{steps * 0.01:8.2f} s without a set-point for want of {words}")
+        say(f"{steps * 0.01:8.2f} s without a set-point: lacking {words}")
     for fault in faults:
         say(f"wrong: {fault}")
     say(str(directory))
@@ -87,14 +88,14 @@ def dry_run_of_log(asked: Request, log: Path) -> int:
 
 
 def _faults(asked: Request, found: ShadowRun, mask: int) -> list[str]:
-    """Return what is wrong with the set-points of the run, for an autopilot that expects ``mask``."""
+    """Return the faults of the run's set-points as text; the autopilot expects type mask ``mask``."""
     if not found.would:
         return ["no set-point at all"]
     settings = asked.config.settings
-    gauge = gauge_for(settings.limits, settings.heading)
+    gauge = setpoint_check(settings.limits, settings.heading)
     for now, message in found.would:
         gauge.take(now, message)
-    return gauge.faults(mask) + likeness(found).faults
+    return gauge.faults(mask) + comparison(found).faults
 
 
 def _autopilots(log: Path) -> dict[int, int]:
@@ -114,7 +115,8 @@ def _autopilots(log: Path) -> dict[int, int]:
 def _profile(asked: Request, log: Path, autopilots: dict[int, int]) -> Profile:
     """Return the profile of the own vehicle.
 
-    Raises InputError, which lists the vehicles that are there and those that may be flown.
+    Raises InputError if it is absent or its autopilot is unknown. The message lists the vehicles of the log,
+    and the supported ones among them.
     """
     system = asked.system
     profile = KNOWN.get(autopilots.get(system, mavlink.MAV_AUTOPILOT_INVALID))
@@ -141,7 +143,7 @@ def _check_origin(asked: Request, log: Path, seen: OwnRecords) -> None:
             "(GLOBAL_POSITION_INT); allowed: a log of a flight with a position"
         )
     far = float((asked.config.origin.frame.to_enu(*seen.place) ** 2).sum() ** 0.5)
-    if far > _FAR:
+    if far > _MAX_DISTANCE_M:
         raise InputError(
             f"origin in {asked.name}: is {far / 1000.0:.0f} km away from where vehicle {system} is in {log}; "
             f"allowed: one near {latitude:.5f}, {longitude:.5f}, in a copy of the file"

@@ -18,27 +18,28 @@ from mavlink_bridge.messages import SetpointLocal
 from mavlink_bridge.wire.signing import Signing
 from outrider.fly.transmit_statistics import TransmitStatistics
 from outrider.logs.flight_modes import mode_of
-from outrider.supervision.supervised_node import OURS, TWIN, SupervisedNode
+from outrider.supervision.supervised_node import DUPLICATE, OURS, SupervisedNode
 
 SHOWN = 200_000
 """Wall time between two states (µs)."""
-_RARELY = 5
+_STATES_PER_UPDATE = 5
 """Number of states between two updates of figures that take longer to compute."""
-_AGAIN = 10.0
-"""Time (s) after which a text that the autopilot keeps repeating is reported again."""
+_REPEAT_AFTER_S = 10.0
+"""Time (s) after which a repeated status text of the autopilot, or a repeated refusal, is reported again."""
 _REPEATED = ("autopilot", "refused")
 _WAITING = (Phase.CONNECT, Phase.PREPARE)
-_PLAIN = 0.005
-"""Rate error above which a clock is not a quartz clock."""
+_QUARTZ_RATE_TOLERANCE = 0.005
+"""Rate error from which on a clock is not a quartz clock."""
 
 
 class State(NamedTuple):
     """State of the flight.
 
-    ``at`` is the companion's time since its start (s); ages are in ms. ``plan_ms`` holds median and 99th
-    percentile. ``beat`` is the autopilot's last heartbeat: type, autopilot, base and custom mode, system
-    status. ``stamp`` is that of the newest signature. ``would``: in a dry run, the last set-point that would
-    have been sent. ``simulated``: whether the autopilot's clock is a simulation's, None before that is known.
+    ``at``: the companion's time since its start (s). ``position``, ``velocity``: fleet-local ENU (m, m/s).
+    ``*_ms``: ages (ms), but ``plan_ms``: median and 99th percentile of CPU time per plan. ``beat``: the
+    autopilot's last heartbeat: type, autopilot, base and custom mode, system status. ``stamp``: time stamp of
+    the newest signature. ``would``: in a dry run, the last set-point that would have been sent.
+    ``simulated``: whether the autopilot's clock is a simulation's, None before this is known.
     """
 
     at: float = 0.0
@@ -72,7 +73,7 @@ class State(NamedTuple):
 
 
 class StatusReports:
-    """Status reporter, called after every step; it reports through ``tell``."""
+    """Status reporter: ``look`` is called after every step and reports through ``tell``."""
 
     def __init__(
         self,
@@ -107,8 +108,7 @@ class StatusReports:
         self._began = now if self._began is None else self._began
         at = round((now - self._began) * 1e-6, 2)
         phase = self._companion.pilot.phase
-        # A change of phase needs the rest of the state at once: the parent may send the hold request a moment
-        # later.
+        # At a change of phase the parent needs the whole state at once: it may send the hold request soon.
         at_once = phase is not self._phase
         self._changes(at)
         if self._shown is None or at_once or wall - self._shown >= SHOWN:
@@ -119,7 +119,7 @@ class StatusReports:
         """Return the state at ``now`` (µs)."""
         node, pilot = self._companion, self._companion.pilot
         vehicle, view = pilot.vehicle, node.world.at(now)
-        if self._states % _RARELY == 0:
+        if self._states % _STATES_PER_UPDATE == 0:
             for reading in node.shed():
                 self.plan_times.add(reading // 1000)
             spread = self.plan_times.spread
@@ -197,7 +197,7 @@ class StatusReports:
                 if name not in concerns:
                     self._event(at, "over", concern.text)
             self._concerns = concerns
-        if (duplicates := self._supervised.barred == TWIN) != self._duplicates:
+        if (duplicates := self._supervised.barred == DUPLICATE) != self._duplicates:
             self._duplicates = duplicates
             self._event(
                 at, "critical" if duplicates else "over", "another companion with this system id is heard"
@@ -223,9 +223,9 @@ class StatusReports:
         return _words(newest) if isinstance(self._companion, DryRun) and newest is not None else ""
 
     def _event(self, at: float, what: str, text: str) -> None:
-        if self._lately.get((what, text), -_AGAIN) + _AGAIN > at and what in _REPEATED:
+        if self._lately.get((what, text), -_REPEAT_AFTER_S) + _REPEAT_AFTER_S > at and what in _REPEATED:
             return
-        self._lately = {key: time for key, time in self._lately.items() if time + _AGAIN > at}
+        self._lately = {key: time for key, time in self._lately.items() if time + _REPEAT_AFTER_S > at}
         self._lately[what, text] = at
         self._tell(kind="event", at=at, what=what, text=text)
 
@@ -234,7 +234,7 @@ def judgement(rate: float, *, simulated: bool) -> str:
     """Return as text what the autopilot's clock was found to be."""
     if simulated:
         return f"a simulation's, {rate:.3f} times as fast as the wall's: it is followed"
-    if abs(rate - 1.0) < _PLAIN:
+    if abs(rate - 1.0) < _QUARTZ_RATE_TOLERANCE:
         return "a real one: the wall's time counts"
     return (
         f"taken for a real one with a delay that changes, though it seems to be {rate:.3f} times as fast; "

@@ -1,6 +1,7 @@
 """Comparison of a shadow run's set-points with the recorded flight.
 
-Set-points begin at the vehicle's position. So they must be near it, in its own frame, and lead where it goes.
+Set-points begin at the vehicle's position. So they must be near it, in the same frame, and their velocities
+must agree with their positions.
 """
 
 from __future__ import annotations
@@ -12,24 +13,24 @@ import numpy as np
 from outrider.shadow.setpoints import TOGETHER, Array, Course, course
 from outrider.shadow.shadow_run import ShadowRun
 
-_FRESH: Final = 500_000
+_MAX_POSITION_AGE_US: Final = 500_000
 """Maximum age of a position (µs); an older one is not compared."""
-_AHEAD: Final = 0.05
-"""Time by which a set-point may lead the newest position (s): look-ahead, delay and the step."""
-_WINDOW: Final = 1_000_000
+_MAX_LEAD_S: Final = 0.05
+"""Maximum lead of a set-point over the newest position (s): look-ahead, delay and one step."""
+_WINDOW_US: Final = 1_000_000
 BESIDE, ASTRAY = 0.5, 1.0
-"""Limits (m) that 99 % and 95 % of the set-points keep: estimates are wrong by decimetres, and late.
+"""Limits (m) of the percentiles ``beside`` and ``astray``: estimates are wrong by decimetres, and late.
 
-A recorded PX4's own estimates diverged by 0.5 m in a second.
+In a recorded PX4 log, position and integrated velocity of the estimator diverged by 0.5 m in a second.
 """
 
 
 class TrajectoryComparison(NamedTuple):
     """Result of the comparison; None where there is nothing to measure.
 
-    ``beside``: distance (m) of set-points from the vehicle's position, less its own motion since then, 99th
-    percentile. ``astray``: distance (m) between where the velocities of one second lead and where the
-    positions do, 95th percentile over the seconds.
+    ``beside``: distance (m) of set-points from the vehicle's newest position, less the motion at the
+    set-point's speed since then, 99th percentile. ``astray``: deviation (m) of the set-points' velocities,
+    integrated over one second, from their change of position, 95th percentile.
     """
 
     beside: float | None
@@ -46,7 +47,7 @@ class TrajectoryComparison(NamedTuple):
         return found
 
 
-def likeness(found: ShadowRun) -> TrajectoryComparison:
+def comparison(found: ShadowRun) -> TrajectoryComparison:
     """Compare the set-points that would have been sent with the vehicle's own positions."""
     of = course(found.would)
     return TrajectoryComparison(_quantile(_beside(of, found), 99), _quantile(_astray(of), 95))
@@ -59,9 +60,9 @@ def _beside(of: Course, found: ShadowRun) -> Array:
     places = np.array([place for _, place in found.places])
     newest = np.searchsorted(times, of.times, side="right") - 1
     age = of.times - times[newest]
-    known = (newest >= 0) & (age <= _FRESH)
+    known = (newest >= 0) & (age <= _MAX_POSITION_AGE_US)
     off = np.linalg.norm(of.positions - places[newest], axis=1)
-    moved = np.linalg.norm(of.velocities, axis=1) * (age * 1e-6 + _AHEAD)
+    moved = np.linalg.norm(of.velocities, axis=1) * (age * 1e-6 + _MAX_LEAD_S)
     result: Array = np.maximum(off - moved, 0.0)[known]
     return result
 
@@ -74,7 +75,7 @@ def _astray(of: Course) -> Array:
     way = np.cumsum(0.5 * (of.velocities[1:] + of.velocities[:-1]) * (spans * 1e-6)[:, None], axis=0)
     way = np.vstack((np.zeros(3), way))
     gaps = np.concatenate(([0], np.cumsum(spans > TOGETHER)))
-    end = np.searchsorted(of.times, of.times + _WINDOW)
+    end = np.searchsorted(of.times, of.times + _WINDOW_US)
     begin = np.flatnonzero(end < len(of.times))
     end = end[begin]
     begin, end = begin[gaps[begin] == gaps[end]], end[gaps[begin] == gaps[end]]

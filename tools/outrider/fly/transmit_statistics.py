@@ -1,4 +1,4 @@
-"""Transmit statistics: a tap that counts a companion's outgoing frames, commands and set-points."""
+"""Transmit statistics: a tap of the loop that counts outgoing frames and commands and checks set-points."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import leading_frames
 from mavlink_bridge.wire.header import command_of
-from outrider.fly.setpoint_check import gauge_for
+from outrider.fly.setpoint_check import setpoint_check
 
 
 class TransmitStatistics:
     """Counters of a companion's outgoing frames, and the check of its set-points.
 
-    ``messages`` counts frames by link, ``commands`` those to the autopilot by number; ``setpoints`` is the
-    check, ``newest`` the last set-point.
+    ``messages``: number of frames by link. ``commands``: number of COMMAND_LONG messages, on any link, by
+    MAV_CMD. ``setpoints``: the check. ``newest``: the last set-point, None before the first.
     """
 
     def __init__(self, limits: LimitsConfig, compensation: float = 0.0) -> None:
-        """Start the counters; ``compensation``: what may be added to a plan's acceleration (m/s²)."""
+        """Start the counters; ``compensation``: maximum addition to a plan's acceleration (m/s²)."""
         self.messages: Counter[str] = Counter()
         self.commands: Counter[int] = Counter()
-        self.setpoints = gauge_for(limits, compensation=compensation)
+        self.setpoints = setpoint_check(limits, compensation=compensation)
         self.newest: SetpointLocal | None = None
         self._codec = Codec(
             lambda identifier, _system, _component: (
@@ -36,7 +36,7 @@ class TransmitStatistics:
         )
 
     def begin(self, now: int, node: str, /) -> None:
-        """Do nothing; a tap needs this method."""
+        """Do nothing; the protocol of taps requires this method."""
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
         """Count the frames of an outgoing datagram, and check its set-points."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Final
 
 FIRST: Final = 10.0
-"""Time limit for the first message of a process (s): on a busy machine it only begins then."""
+"""Time limit for the first message of a process (s): on a busy machine it starts slowly."""
 HUNG: Final = 2.0
-"""Time without a message after which a process that was received before counts as hung (s)."""
-_LATE: Final = 0.5
+"""Time after a message (s); a process that sends no other one within it counts as hung."""
+_MAX_POLL_INTERVAL_S: Final = 0.5
 
 
 class Watchdog:
@@ -26,8 +26,8 @@ class Watchdog:
         self._since, self._limit = now, HUNG
 
     def stopped(self, now: float) -> bool:
-        """Return whether the process has been silent for too long; polled many times a second."""
-        if now - self._looked > _LATE:
+        """Return whether the process has been silent for too long; to be polled at least every 0.5 s."""
+        if now - self._looked > _MAX_POLL_INTERVAL_S:
             self._since = now
         self._looked = now
         return now - self._since > self._limit

@@ -1,4 +1,4 @@
-"""Links of a companion, opened: each physical link once, however many of the companion's links use it."""
+"""Open links of a companion; several of its links may share one physical link, which is opened once."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from outrider.errors import InputError
 from outrider.supervision.duplicate_ids import DuplicateIds
 
 LAST_VEHICLE = 250
-"""Highest system id of a vehicle; those above are ground stations'."""
+"""Highest system id of a vehicle; higher ids belong to ground stations."""
 _COMMANDS = (mavlink.MAVLINK_MSG_ID_COMMAND_INT, mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
 _SWARMS = frozenset(
     (
@@ -31,7 +31,7 @@ _SWARMS = frozenset(
         mavlink.MAVLINK_MSG_ID_TUNNEL,
     )
 )
-"""Messages between companions; other messages may come from any sender."""
+"""Messages between companions: on the swarm link only from senders that ``swarm`` admits."""
 
 
 class Wiring(NamedTuple):
@@ -46,16 +46,16 @@ class Wiring(NamedTuple):
     duplicates: DuplicateIds
 
     def physical(self, name: str) -> Link:
-        """Return the physical link below the end of that ``name``."""
+        """Return the physical link that carries the companion's link ``name``."""
         return next(demultiplexer.link for demultiplexer in self.demultiplexers if name in demultiplexer.ends)
 
     def drain(self) -> None:
-        """Discard what has arrived: messages from before the start do not count."""
+        """Discard the messages received so far: they are older than the start."""
         for demultiplexer in self.demultiplexers:
             demultiplexer.forget()
 
     def lend(self) -> None:
-        """Release serial ports in this process: a forked process uses the links now."""
+        """Release serial ports in this process, after a forked process has taken over the links."""
         for demultiplexer in self.demultiplexers:
             if isinstance(demultiplexer.link, SerialPort):
                 demultiplexer.link.let_go()
@@ -69,8 +69,8 @@ class Wiring(NamedTuple):
 def wants(name: str, system: int, target: int, config: CompanionConfig) -> Wants:
     """Return a predicate for the frames of a physical link that belong to the companion's link ``name``.
 
-    These are all frames that the companion receives there (``reception``), and those that its log records.
-    Its own frames that come back belong to no link.
+    These are the frames that the companion processes there (``reception``), and others for its log. The
+    companion's own frames, echoed by the link, belong to no link.
     """
     accepted = accepts(name, system, target, config)
 
@@ -111,7 +111,7 @@ def wants(name: str, system: int, target: int, config: CompanionConfig) -> Wants
 def wire(
     endpoints: dict[str, Endpoint], system: int, target: int, config: CompanionConfig, clock: Clock
 ) -> Wiring:
-    """Open the links. Raises InputError if one cannot be opened; then none stays open."""
+    """Open the links. Raises InputError if a link cannot be opened, after closing the others."""
     with ExitStack() as opened:
         demultiplexers = []
         duplicates = DuplicateIds(system, clock)

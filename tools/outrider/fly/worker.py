@@ -1,4 +1,4 @@
-"""Flying process: the companion under its clock and over its links, until the parent asks it to end."""
+"""Worker: body of the child process that runs the companion in real time, on its clock and links."""
 
 from __future__ import annotations
 
@@ -41,16 +41,16 @@ _IGNORED: Final = (
 )
 """Signals that the child ignores.
 
-The parent alone handles them, and a terminal that is closed or stopped ends no flight.
+Only the parent handles them, so a closed or stopped terminal does not end the child.
 """
 
 
 class Worker:
     """Body of the flying process.
 
-    ``links`` maps the companion's names to links, which ``duplicates`` observes; the log is written to
-    ``directory``. ``simulated``: whether an earlier process found the autopilot's clock to be a simulation's;
-    None if that is unknown.
+    ``links`` maps the companion's link names to links, which ``duplicates`` observes; the log is written to
+    ``directory``. ``simulated``: whether an earlier process identified the autopilot's clock as a
+    simulation's; None if unknown.
     """
 
     def __init__(
@@ -63,8 +63,8 @@ class Worker:
         simulated: bool | None = None,
     ) -> None:
         self._asked, self._orders, self._directory = asked, orders, directory
-        self._doors = [ReadOnlyLink(link) for link in links.values()] if asked.dry_run else []
-        self._links = dict(zip(links, self._doors or links.values(), strict=True))
+        self._read_only_links = [ReadOnlyLink(link) for link in links.values()] if asked.dry_run else []
+        self._links = dict(zip(links, self._read_only_links or links.values(), strict=True))
         self._parent, self._duplicates, self._simulated = os.getpid(), duplicates, simulated
         self._signing = None if asked.key is None else Signing(asked.key)
         kind = DryRun if asked.dry_run else Companion
@@ -79,22 +79,22 @@ class Worker:
         )
 
     def resume(self, newest: int) -> None:
-        """Continue after another process, whose newest signature had the stamp ``newest``.
+        """Sign with time stamps after ``newest``, the last one of an earlier process.
 
-        A simulation's time may run ahead of the wall's.
+        They may be ahead of the wall clock if a simulation runs faster than it.
         """
         if self._signing is not None:
             self._signing.resume(newest)
 
     def followed(self, wall: Clock) -> FollowedClock | None:
-        """Return the clock that the companion runs on; None for ``wall`` itself."""
+        """Return the clock that the companion runs on; None if that is ``wall`` itself."""
         asked = self._asked.config.clock
         if asked == "wall":
             return None
         return FollowedClock(wall, wall.now(), simulated=True if asked == "autopilot" else self._simulated)
 
     def main(self) -> None:
-        """Run the process, from fork to exit."""
+        """Run the process from fork to exit; exit status 0, or 3 after an exception."""
         for which in _IGNORED:
             signal.signal(which, signal.SIG_IGN)
         if self._asked.realtime:
@@ -103,7 +103,7 @@ class Worker:
             sharpen_timers()
         with Log(self._directory, self._asked.system, self._report_error) as log:
             status = self._flown(log)
-            # From here on the parent sends the hold request; writing files takes time.
+            # The parent sends the hold request now; it need not wait until the files are written.
             self._orders.tell(kind="left")
         sys.exit(status)
 
@@ -162,7 +162,7 @@ class Worker:
     def _leave(
         self, loop: RealTime, news: StatusReports, departures: TransmitStatistics, rate: float
     ) -> None:
-        """Report the figures that the summary needs."""
+        """Send the figures of the summary to the parent."""
         node, statistics = self.companion, loop.statistics
         for reading in node.shed():
             news.plan_times.add(reading // 1000)
@@ -190,7 +190,7 @@ class Worker:
                 "bad": node.bad_frames,
                 "refused": sum(counters.refused for counters in node.counters.values()),
                 "overruns": statistics.overruns,
-                "kept_back": sum(door.kept for door in self._doors),
+                "kept_back": sum(read_only.kept for read_only in self._read_only_links),
             },
             deadline_steps=statistics.steps + statistics.skipped,
             deadline_misses=statistics.misses + statistics.skipped,

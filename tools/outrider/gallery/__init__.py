@@ -1,1 +1,1 @@
-"""Gallery: flies every method in every scenario and returns a page of pictures."""
+"""Gallery: flies every method in every scenario and writes a page of pictures."""

@@ -31,17 +31,17 @@ def gallery(
 ) -> int:
     """Fly and draw the scenarios ``names``, or all, and return the exit status.
 
-    The status is 0 if all were drawn, 1 after a failed flight, and 3 after an interruption. A method that
-    gets stuck, or violates d_min, is a result that the picture shows. The journal is in ``out``
-    (``runs/sweep-gallery``); the page, ``README.md``, with its pictures is in ``to``, by default there too.
-    Raises InputError for an unknown scenario, or if another page exists there.
+    The status is 0 if all flights succeeded, 1 after a failed flight, and 3 after an interruption. A method
+    that gets stuck or violates d_min is a result that the picture shows, no failure. The journal is written
+    to ``out`` (default ``runs/sweep-gallery``); the page ``README.md`` and its pictures to ``to`` (default
+    ``out``). Raises InputError for an unknown scenario, or if ``to`` holds a README.md that is no gallery.
     """
     shown = showings(chosen(names))
     found = cells_of(shown)
     folder = places.prepare(out, "gallery")
     there = folder if to is None else to
     _check(there)
-    # The header covers all scenarios, so that a few may be flown first and the rest later.
+    # The header covers all scenarios, so that one journal can hold a few first and the rest later.
     whole = header("gallery", cells_of(showings(scenarios())))
     entries = flown(whole, found, (SEED,), folder, run, jobs)
     if entries is None:
@@ -60,7 +60,7 @@ def gallery(
 
 
 def _check(folder: Path) -> None:
-    """Create the ``folder`` of the page. Raises InputError if that fails, or if another page exists there."""
+    """Create the page's ``folder``. Raises InputError if this fails, or if its README.md is no gallery."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

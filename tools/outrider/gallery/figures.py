@@ -15,10 +15,10 @@ from outrider.sweep.runs import Ending, Run
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_LONG = 44
-"""Largest number of characters of a failure above a panel."""
-_HIGH = 6.0
-"""Largest separation (m) shown; above it no vehicles are close."""
+_MAX_FAILURE_CHARACTERS = 44
+"""Maximum number of characters of the failure text above a panel."""
+_MAX_SEPARATION_M = 6.0
+"""Upper limit of the separation axis (m)."""
 
 Panel = tuple[str, Run, Mapping[str, Any] | None]
 """Method, result of the run, and the scene of the flight, or None without a flight."""
@@ -46,7 +46,7 @@ def draw(scenario: str, panels: Sequence[Panel], path: Path) -> None:
 
 def outcome(run: Run) -> str:
     """Describe the result of a flight in a few words."""
-    what = shorten(run.what or "", _LONG)
+    what = shorten(run.what or "", _MAX_FAILURE_CHARACTERS)
     if run.ending in (Ending.FAULT, Ending.LOST):
         return f"no flight: {what}"
     words = [what] if what else []
@@ -60,7 +60,7 @@ def outcome(run: Run) -> str:
 
 
 def _elsewhere(run: Run) -> str:
-    """Name what a violation concerns, if it is not a pair of vehicles."""
+    """Return a remark if no pair of vehicles violated d_min, so that the violations concern others."""
     apart = run.separation is not None and run.d_min is not None and run.separation >= run.d_min
     return " (target or obstacle)" if apart else ""
 
@@ -91,7 +91,7 @@ def _separation(axes: Axes, scene: Mapping[str, Any]) -> None:
     near = np.array(scene["separation"])
     axes.plot(scene["time_s"], np.where(near < 0.0, np.nan, near), lw=1.0)
     axes.axhline(scene["d_min"], color=LIMIT, lw=1.0)
-    axes.set_ylim(0.0, _HIGH)
+    axes.set_ylim(0.0, _MAX_SEPARATION_M)
     axes.set_xlabel("s", fontsize=8)
     axes.tick_params(labelsize=7)
     axes.grid(alpha=0.3)

@@ -12,12 +12,12 @@ from outrider.sweep.flying import prepared
 from outrider.sweep.tasks import Task
 
 RUN = f"{__name__}:fly"
-_EVERY = 5
-"""Number of samples of the ground truth for one point of the picture: 0.1 s."""
+_SAMPLES_PER_POINT = 5
+"""Number of samples of the ground truth per point of the picture: 0.1 s."""
 
 
 def fly(task: Task) -> dict[str, Any]:
-    """Fly a task without files and return its summary. The same task gives the same result."""
+    """Fly a task without files; return its summary with ``scene``. The same task gives the same result."""
     outcome, summary = measured(prepared(task), task.seed)
     return {**summary, "scene": _scene(outcome)}
 
@@ -25,23 +25,24 @@ def fly(task: Task) -> dict[str, Any]:
 def _scene(outcome: Outcome) -> dict[str, Any]:
     """Return the data of the picture, rounded to cm because it goes into a journal.
 
-    From the start of the clock it has times (T,) s; positions (T, K, 2) and the path of the target (T, 2), m
-    from above; the least separation (T,), m; obstacles as (east, north, radius); the paths of moving
-    obstacles (M, T, 2) with their radii; and the number of escorts among the vehicles.
+    Times (T,) since the start of the clock (s); horizontal positions (T, K, 2) and the target's path (≤ T,
+    2), without the times at which it is absent (m); the least separation (T,), m, or −1 where there is none;
+    obstacles as (east, north, radius); paths of moving obstacles (M, T, 2) and their radii; the number of
+    vehicles without bystanders; d_min (m).
     """
     start = outcome.clock_start or 0
     samples = outcome.truth.samples(start, outcome.clock_end)
     near = samples.separation
-    pieces = np.arange(0, len(near), _EVERY)
+    pieces = np.arange(0, len(near), _SAMPLES_PER_POINT)
     nearest = np.minimum.reduceat(near, pieces) if len(near) else near
-    target = samples.target[::_EVERY]
+    target = samples.target[::_SAMPLES_PER_POINT]
     return {
-        "time_s": np.round((samples.time[::_EVERY] - start) * 1e-6, 2).tolist(),
-        "position": np.round(samples.position[::_EVERY, :, :2], 2).tolist(),
+        "time_s": np.round((samples.time[::_SAMPLES_PER_POINT] - start) * 1e-6, 2).tolist(),
+        "position": np.round(samples.position[::_SAMPLES_PER_POINT, :, :2], 2).tolist(),
         "separation": np.round(np.where(np.isfinite(nearest), nearest, -1.0), 2).tolist(),
         "target": np.round(target[np.isfinite(target).all(axis=1)][:, :2], 2).tolist(),
         "obstacles": [[*one.at[:2], one.radius] for one in outcome.scenario.obstacles],
-        "moving": np.round(samples.moving[::_EVERY, :, :2].swapaxes(0, 1), 2).tolist(),
+        "moving": np.round(samples.moving[::_SAMPLES_PER_POINT, :, :2].swapaxes(0, 1), 2).tolist(),
         "moving_radius": [one.radius for one in outcome.scenario.moving],
         "vehicles": outcome.scenario.vehicles,
         "d_min": outcome.scenario.d_min,

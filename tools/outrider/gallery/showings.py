@@ -11,7 +11,7 @@ from outrider.sweep.cells import Cell, cells
 from outrider.sweep.grid import Sweep
 
 WAYS = ("baseline", "swivel", "approach_angle", "tangential", "certified")
-"""Methods, and the certified avoidance that replaces them."""
+"""The four methods of the paper, and the certified avoidance."""
 
 
 class GalleryPanel(NamedTuple):

@@ -2,5 +2,6 @@
 
     log → census (systems, their messages and gaps; unreadable parts) → listing (tables, or JSON)
 
-Only headers are read, and the last HEARTBEAT of each component.
+For the census only headers are read, and the last HEARTBEAT of each component. ``message_stream`` and
+``dialect`` give all messages to other packages.
 """

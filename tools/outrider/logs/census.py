@@ -18,8 +18,8 @@ class Gaps(NamedTuple):
 class Vehicle(NamedTuple):
     """All that was sent under one system id.
 
-    ``kind`` and ``autopilot``: numbers of MAV_TYPE and MAV_AUTOPILOT in its last HEARTBEAT, None without one;
-    of several components the autopilot's counts.
+    ``kind`` and ``autopilot``: numbers of MAV_TYPE and MAV_AUTOPILOT in its last HEARTBEAT, None without one.
+    Among several components, the autopilot's HEARTBEAT is used.
 
     ``counts``: message ids and how many of each, the most frequent first; ``versions``: of MAVLink;
     ``signed``: messages that carry a signature; ``first``, ``last``: its earliest and latest time (µs).
@@ -43,9 +43,9 @@ class Vehicle(NamedTuple):
         return sum(count for _, count in self.counts)
 
     def rate(self, count: int) -> float:
-        """Return the rate (1/s) of ``count`` messages from the first to the last.
+        """Return ``count`` messages per second of the time from ``first`` to ``last``.
 
-        It is 0 if the two are one instant.
+        It is 0 if the two times are equal.
         """
         return count / (1e-6 * (self.last - self.first)) if self.last > self.first else 0.0
 

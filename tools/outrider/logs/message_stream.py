@@ -15,7 +15,7 @@ from outrider.logs.dialect import Kind, kind
 
 LATEST: Final = (1 << 63) // 1000 - 1
 """µs, in the year 2262: later stamps do not fit the formats that count nanoseconds, and are damage."""
-_OFTEN: Final = 2048
+_MESSAGES_PER_REPORT: Final = 2048
 """Number of messages between two reports of progress."""
 
 Watch = Callable[[str, float], None]
@@ -36,7 +36,7 @@ class LogMessage(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """Parts that a pass left out: ``damaged`` stretches, and well-placed messages that the dialect lacks."""
+    """Parts that a pass left out: ``damaged`` records, and ``unknown`` ones that the dialect lacks."""
 
     damaged: int
     unknown: int
@@ -59,7 +59,7 @@ class Log:
         return self.path.stat().st_size
 
     def check(self) -> None:
-        """Raise LogError if the log is missing, unreadable or without MAVLink."""
+        """Raise LogError if the log is missing, unreadable or without a MAVLink frame."""
         read_tlog(self.path)
 
     def __iter__(self) -> Iterator[LogMessage]:
@@ -99,7 +99,7 @@ def watched(
 
     def of(log: Log) -> Iterator[LogMessage]:
         for number, spoken in enumerate(log):
-            if number % _OFTEN == 0:
+            if number % _MESSAGES_PER_REPORT == 0:
                 done = min(sum(one.done for one in logs) / total, 1.0)
                 watch(log.path.name, low + (high - low) * done)
             yield spoken

@@ -18,8 +18,8 @@ from outrider.logs.census import Census, Gaps, Vehicle
 SHORTEST_GAP = 1 << 21
 """µs, 2.1 s: a shorter silence is never a gap, because components send a HEARTBEAT every second."""
 UNUSUAL = 8
-"""A silence of this many usual intervals is a gap."""
-_OFTEN = 1 << 12
+"""A silence of more than this many mean intervals, rounded up to a power of two (µs), is a gap."""
+_RECORDS_PER_REPORT = 1 << 12
 """Number of records between two reports of progress."""
 
 
@@ -34,7 +34,7 @@ def count(path: Path, progress: Callable[[float], None]) -> Census | None:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from None
     reader, tally = TlogReader(path), _Tally()
     records = iter(reader)
-    while piece := list(islice(records, _OFTEN)):
+    while piece := list(islice(records, _RECORDS_PER_REPORT)):
         tally.add(piece)
         progress(reader.bytes_read / max(size, 1))
     vehicles = tally.vehicles()
@@ -55,8 +55,8 @@ class _Stream:
 class _System:
     """One system id.
 
-    ``silences`` counts those that may be gaps, by the bit length of their µs, so that memory does not grow
-    with the log.
+    ``silences``: number of silences that may be gaps, by the exponent of the next power of two (µs), so that
+    memory does not grow with the log.
     """
 
     __slots__ = ("before", "first", "last", "links", "longest", "signed", "silences")

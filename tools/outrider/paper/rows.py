@@ -13,7 +13,7 @@ SENSORS = "rtk"
 
 
 class Row(NamedTuple):
-    """One row. ``told`` is the paper's result (Sec. IV-B to IV-G): s, "stuck", or empty."""
+    """One row. ``reported``: the paper's result (Sec. IV-B to IV-G): time (s), "stuck", or empty."""
 
     scenario: str
     method: str

@@ -1,1 +1,1 @@
-"""Processes of this machine: gives forked children, memory that they share, and the number of cores."""
+"""Processes of this machine: forked children, memory that they share, and the number of cores."""

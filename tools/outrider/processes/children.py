@@ -1,4 +1,4 @@
-"""Child processes: they are forked, observed, stopped and resumed, and joined."""
+"""Child processes by name: start by fork, exit status, stop and resume, join."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Children:
         return {name: status for name, status in found.items() if status is not None}
 
     def freeze(self, name: str) -> None:
-        """Stop a process."""
+        """Suspend a process with SIGSTOP."""
         self._signal(name, signal.SIGSTOP)
 
     def thaw(self, name: str) -> None:
-        """Resume a stopped process."""
+        """Resume a suspended process."""
         self._signal(name, signal.SIGCONT)
 
     def join(self, within: float) -> None:

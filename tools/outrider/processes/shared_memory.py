@@ -1,6 +1,6 @@
-"""Memory that a process shares with those that it forks later.
+"""Memory that a process shares with the processes that it forks later.
 
-A reader may see a value of several numbers half old and half new.
+A reader may see a group of several numbers half old and half new.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class SharedMemory:
         self.numbers: NDArray[np.float64] = np.frombuffer(self._memory, np.float64, numbers, 8 * flags)
 
     def write(self, index: int, text: str) -> None:
-        """Write the text at ``index``; what does not fit is cut off."""
+        """Write the text at ``index``, truncated to 255 bytes of UTF-8."""
         begin, data = self._begin + index * _TEXT, text.encode(errors="replace")[: _TEXT - 1]
         self._memory[begin : begin + _TEXT] = data + bytes(_TEXT - len(data))
 

@@ -1,6 +1,6 @@
 """One real-time flight of a scenario, with one process per node over UDP.
 
-This process is the operator's; it leads the flight by the contents of the board.
+The parent process runs the operator and conducts the flight by the state on the board (``SharedPage``).
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ from sitl.vehicle.config import VehicleConfig
 _START, _START_WITH_PRIORITY = 1_000_000, 3_000_000
 """µs between forking and the first step.
 
-A process that becomes real-time while others still start delays them.
+It is longer with priority, because a real-time process delays the start of the others.
 """
-_NOTHING = Tally(0, 0, 0, 0, 0, ())
+_NO_TALLY = Tally(0, 0, 0, 0, 0, ())
 
 
 class RealTimeFlight:
@@ -53,8 +53,8 @@ class RealTimeFlight:
     The tlogs are written to ``directory``. With ``priority`` every node requests real-time priority;
     ``priority_told`` then reports the result.
 
-    ``run`` may be called once, from the main thread. Meanwhile it handles SIGINT and SIGTERM: the first one
-    lands the fleet, the second one ends the flight at once.
+    ``run`` may be called once, from the main thread. It handles SIGINT and SIGTERM: the first signal lands
+    the fleet, the second ends the flight at once.
     """
 
     def __init__(
@@ -83,9 +83,10 @@ class RealTimeFlight:
     def run(self) -> None:
         """Fly to the end; ``outcome`` then holds the results.
 
-        Raises OutriderError if a process ended by a fault.
+        Raises OutriderError if a process failed or an autopilot left no trace, LinkError if a link cannot be
+        opened.
         """
-        # Compiled before forking, so that not every process has to compile.
+        # The physics is compiled here, before forking, so that not every process compiles it.
         first = self.fleet.autopilot(0)
         for now in (0, self.fleet.vehicle.physics_period):
             first.step(now, [])
@@ -165,7 +166,7 @@ class RealTimeFlight:
             conductor.clock_end,
             conductor.converged_at,
             conductor.failure,
-            [found.tallies or (_NOTHING, _NOTHING) for found in companions],
+            [found.tallies or (_NO_TALLY, _NO_TALLY) for found in companions],
             Messages(
                 operators.sent + sum(found.sent for found in remains.values()),
                 operators.dropped + sum(found.dropped for found in remains.values()),
@@ -177,7 +178,7 @@ class RealTimeFlight:
 
 
 class _Leader:
-    """Link between the board and the conductor; it also applies the scenario's events to processes."""
+    """Observer of the board for the conductor; it also freezes, resumes and ends companions."""
 
     def __init__(
         self,
@@ -200,7 +201,7 @@ class _Leader:
         self._looked = 0
 
     def look(self, now: int, interrupted: bool) -> bool:
-        """Process a step of the operator; return True to end the run."""
+        """Observe the fleet after the operator's step, at most once per ``SAMPLE``; return True to end."""
         if now - self._looked < SAMPLE:
             return False
         self._looked = now
@@ -248,7 +249,7 @@ class _Leader:
                 self.moves.append((now, np.array(change.target)))
 
     def _blind(self, now: int) -> bool:
-        """Wait for vehicles without a position yet; return True to end the run, because it has failed."""
+        """Wait for missing positions; return True to end the run, after ``PREPARE_CAP`` or an abort."""
         unseen = np.isnan(self._board.positions).any(axis=1)
         if now - (self._began or now) > PREPARE_CAP:
             systems = [str(self._fleet.systems[k]) for k in np.flatnonzero(unseen)]
@@ -256,7 +257,7 @@ class _Leader:
         return self._conductor.stage is not Stage.PREPARE
 
     def _check(self, now: int, interrupted: bool) -> None:
-        """Land all vehicles after an interruption, or if a required process has ended."""
+        """Land all vehicles after an interruption, or if a process has ended that was not to vanish."""
         conductor, board = self._conductor, self._board
         if interrupted and conductor.stage in (Stage.PREPARE, Stage.CLOCK):
             conductor.abort(now, "interrupted: all vehicles were told to land")
@@ -293,7 +294,7 @@ class _Leader:
 def _nothing(conductor: Conductor, why: str) -> str:
     """Return the reason why there is no outcome."""
     said = f"{conductor.failure}; " if conductor.failure else ""
-    return f"{said}{why}: there is no truth about its vehicle"
+    return f"{said}{why}: its vehicle's true motion was not recorded"
 
 
 def _punctuality(companions: Collection[ProcessResults]) -> Punctuality:

@@ -1,7 +1,7 @@
 """Node behind impaired links.
 
-Datagrams that arrive over a perfect loopback are delayed, lost and reordered by the scenario's faults, in the
-same simulated network as in lock-step.
+Datagrams arrive unimpaired over the loopback; the scenario's faults then delay, drop and reorder them, by the
+simulated network that lock-step flights use.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from outrider.runs import names
 
 
 class ImpairedLink:
-    """``node`` behind ``network``, in which every channel leads from one sender to it.
+    """``node`` behind ``network``, of which each channel leads from one sender to ``node``.
 
-    ``senders``: for each link the node at its other end; None where there are many, which are identified by
-    the system id in the header. Data from elsewhere, as on a multicast group that others use too, is dropped.
+    ``senders``: for each link the node at its other end, or None if there are several, which the system id in
+    the header identifies. Data from other senders, possible on a multicast group, is dropped.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class ImpairedLink:
         return self.node.name
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Step the node with what has passed the simulated network by ``now``."""
+        """Step the node with the datagrams that the simulated network delivers by ``now`` (µs)."""
         for datagram in inbox:
             sender = self._senders.get(datagram.link) or self._sender(datagram)
             if (sender, datagram.link) in self._known:
@@ -50,7 +50,7 @@ class ImpairedLink:
         return leaving
 
     def show(self, taps: Sequence[StepObserver]) -> None:
-        """Pass the last step of the node, with what passed the network, to ``taps``; once."""
+        """Pass the node's last step, with delivered and sent datagrams, to ``taps``; once per step."""
         if self._last is None:
             return
         (now, delivered, leaving), self._last = self._last, None

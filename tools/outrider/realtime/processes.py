@@ -1,4 +1,4 @@
-"""Processes of a real-time run, which leave results."""
+"""Processes of a real-time run, and their results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.wiring import Wiring
 from outrider.realtime.workers import ProcessResults, Worker
 
-_FAREWELL = 10.0
+_EXIT_TIMEOUT_S = 10.0
 """s that a process has to write its results."""
 
 
@@ -30,7 +30,7 @@ class Processes(Children):
     def results(self) -> dict[str, ProcessResults]:
         """End all processes, kill those that do not end in time, and return their results by name."""
         self._board.stop = True
-        self.join(_FAREWELL)
+        self.join(_EXIT_TIMEOUT_S)
         names = [worker.rough.name for worker in self._workers]
         return {name: _remains(self._scratch / name) for name in names}
 

@@ -1,7 +1,7 @@
 """Shared memory of the processes of a real-time run; each process writes its own rows.
 
-Rows are float64, written by one process each. A reader may see a row half old and half new; the difference is
-one step of a vehicle and does not matter to an observer.
+Each row of float64 is written by one process. A reader may see a row half old and half new; the two differ by
+one sample of a vehicle, which does not matter to an observer.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ _FLAGS = 3
 class SharedPage:
     """Shared memory for ``vehicles`` vehicles; made before the processes fork.
 
-    Times are µs, 0 for not yet. ``goal``: the goal event; ``end``: the end of the clock; ``stop``: all shall
-    end; ``gone`` (K,): the companions that shall end; ``thaws`` (K,): how often each was resumed after a
-    stop. ``window``: shared memory for a view, if there is one.
+    Times are µs, 0 before the event. ``goal``: the goal event. ``end``: end of the measured flight.
+    ``stop``: all processes shall end. ``gone`` (K,): companions that shall end or have ended. ``thaws`` (K,):
+    how often each companion was resumed. ``window``: shared memory for a view, None without a view.
     """
 
     def __init__(self, vehicles: int, window: Window | None = None) -> None:
@@ -44,7 +44,7 @@ class SharedPage:
 
     @property
     def end(self) -> int:
-        """Time of the end of the clock, µs."""
+        """Time of the end of the measured flight, µs."""
         return int(self._flags[1])
 
     @end.setter
@@ -68,29 +68,29 @@ class SharedPage:
         self._armed[k] = armed
 
     def show_companion(self, k: int, ready: bool, waiting: str) -> None:
-        """Write whether companion ``k`` is under way, and what it waits for."""
+        """Write whether companion ``k`` is in phase ESCORT, and what it waits for."""
         self._ready[k] = ready
         self._memory.write(k, waiting)
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """Positions (K, 3), a copy; NaN until a vehicle has written its own."""
+        """Positions (K, 3), ENU (m), a copy; NaN until a vehicle has written its own."""
         return self._rows[:, 0:3].copy()
 
     @property
     def velocities(self) -> NDArray[np.float64]:
-        """Velocities (K, 3), a copy."""
+        """Velocities (K, 3), ENU (m/s), a copy; NaN as the positions."""
         return self._rows[:, 3:6].copy()
 
     @property
     def armed(self) -> NDArray[np.bool_]:
-        """Whether the motors of each vehicle may turn, (K,)."""
+        """Whether each vehicle is armed, (K,); True until it has written its state."""
         armed: NDArray[np.bool_] = self._armed != 0
         return armed
 
     @property
     def ready(self) -> NDArray[np.bool_]:
-        """Whether each companion is under way, (K,)."""
+        """Whether each companion is in phase ESCORT, (K,)."""
         ready: NDArray[np.bool_] = self._ready != 0
         return ready
 

@@ -27,8 +27,8 @@ def spawn(
 ) -> list[Worker]:
     """Return one worker for each node but the operator, due from ``start`` (µs) on.
 
-    The tlogs are written to ``logs``, the true traces to ``scratch``. No two workers are due at one instant
-    if that can be avoided: on few cores the last of them would be late.
+    The tlogs are written to ``logs``, the true traces to ``scratch``. Phases are spread, so that few workers
+    are due at the same instant: on few cores the last of these would be late.
     """
     start -= start % QUANTUM
     timing, happening = fleet.scenario.timing, events(fleet.scenario)
@@ -81,10 +81,10 @@ def spawn(
 
 
 def turns(fleet: Fleet, k: int, start: int) -> tuple[int, int, NodeClock]:
-    """Return the phases (µs) of autopilot ``k`` and its companion from ``start`` on, and the latter's clock.
+    """Return the first due times (µs) of autopilot ``k`` and its companion, and the companion's clock.
 
-    The companion's phase is on its own clock. In true time all phases are evenly spread at the start,
-    whatever the clocks show; later they drift.
+    The companion's time is on its own clock. At ``start`` all phases are evenly spread in true time, whatever
+    the clocks' offsets; later they drift.
     """
     timing, slots, clock = fleet.scenario.timing, _slots(fleet), fleet.clock(k, start)
     turn = start + staggered(2 * k, slots, timing.companion_us)
@@ -94,7 +94,7 @@ def turns(fleet: Fleet, k: int, start: int) -> tuple[int, int, NodeClock]:
 
 
 def operators_turn(fleet: Fleet, start: int) -> int:
-    """Return the time from ``start`` (µs) on at which the operator is due: last, in a slot of its own."""
+    """Return the time (µs) at which the operator is first due: in the last slot after ``start`` (µs)."""
     slots = _slots(fleet)
     return start - start % QUANTUM + staggered(slots - 1, slots, fleet.scenario.timing.companion_us)
 
@@ -102,14 +102,14 @@ def operators_turn(fleet: Fleet, start: int) -> int:
 def _slots(fleet: Fleet) -> int:
     """Return the number of slots.
 
-    There is one for each autopilot, companion and backup node, one for all nodes that the harness plays, and
-    the operator's.
+    There is one for each autopilot, companion and backup node, one for target and moving obstacles together,
+    and one for the operator.
     """
     return 2 * len(fleet.systems) + len(fleet.with_backup) + 2
 
 
 def staggered(k: int, count: int, period: int) -> int:
-    """Return the phase (µs) in ``period`` of node ``k`` of ``count``: evenly spread, a multiple of 4."""
+    """Return the phase (µs) in ``period`` of node ``k`` of ``count``: evenly spread, multiple of QUANTUM."""
     return k * period // count // QUANTUM * QUANTUM
 
 

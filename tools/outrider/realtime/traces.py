@@ -22,8 +22,8 @@ from sitl.node import Autopilot
 class Trace(NamedTuple):
     """Trace of one vehicle.
 
-    ``times`` (n,) µs of all physics steps, ``positions`` (n, 3) ENU, NaN on the ground; ``sampled`` (m,) µs
-    and ``rows`` (m, ROW).
+    ``times`` (n,) of all physics steps (µs); ``positions`` (n, 3) ENU (m), NaN on the ground; ``sampled``
+    (m,) times of the samples (µs); ``rows`` (m, ROW), see ``ground_truth.ROW``.
     """
 
     times: NDArray[np.int64]
@@ -33,7 +33,7 @@ class Trace(NamedTuple):
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Load what ``TraceWriter.save`` wrote."""
+        """Load a file that ``TraceWriter.save`` wrote."""
         with np.load(path) as file:
             return cls(*(file[name] for name in cls._fields))
 
@@ -49,7 +49,7 @@ class TraceWriter:
         self._rows: list[Array] = []
 
     def see(self, now: int) -> Array | None:
-        """Record the trace after a step at ``now``; return the sample (ROW,), if one is due."""
+        """Record the trace after a step at ``now`` (µs); return the sample (ROW,), or None if none is due."""
         autopilot = self._autopilot
         track = ned_to_enu(autopilot.trace)
         if not autopilot.airborne:
@@ -76,7 +76,7 @@ class TraceWriter:
 
 
 class Moved:
-    """Clone of a ``target`` that was moved by hand: at times (µs), to places (3,)."""
+    """Target that repeats the ``moves`` made by hand: (time (µs), place (3,)), in the order of time."""
 
     def __init__(self, target: Target, moves: Sequence[tuple[int, Array]]) -> None:
         self._target, self._moves = target, deque(moves)
@@ -102,8 +102,8 @@ def put_together(
 ) -> None:
     """Pass the flight of all vehicles to ``truth`` on one grid of physics steps (``period`` µs).
 
-    It lasts from the beginning of the last trace to the end of the first. The clones of ``target`` and
-    ``moving`` begin at ``goal`` (µs).
+    The grid covers the time that all traces have in common. ``target`` and ``moving`` are fresh copies; they
+    begin at ``goal`` (µs), or not at all if it is None.
     """
     begin = max(int(trace.times[0]) for trace in traces)
     end = min(int(trace.times[-1]) for trace in traces)

@@ -1,4 +1,4 @@
-"""View of a real-time flight, sent by the process that leads it."""
+"""View of a real-time flight, sent by the parent process."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ PICTURE = 50_000
 
 
 class Seen(NamedTuple):
-    """State of a flight as its leader observes it.
+    """State of a flight as the parent process observes it.
 
-    ``since`` s after the goal event, or after the start before it; stage; positions (K, 3), the target's
-    place and those of the moving obstacles, fleet-local ENU.
+    ``since``: time (s) since the goal event; before that, since the first observation. Positions of the
+    vehicles (K, 3), the ``target`` (3,) or None, and the ``moving`` obstacles (3,) are fleet-local ENU (m).
     """
 
     since: float
@@ -81,7 +81,7 @@ class RealTimeView:
         self._line.send(pickle.dumps(moment, pickle.HIGHEST_PROTOCOL))
 
     def changes(self, seconds: float | None) -> Iterator[Change]:
-        """Yield the new changes, which are dated ``seconds`` after the goal event."""
+        """Yield the new changes; ``seconds``: time since the goal event (s), None before it."""
         for data in self._line.receive():
             commands = decoded(data)
             change = None if commands is None else self.orders.new(commands, seconds)

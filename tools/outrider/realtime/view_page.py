@@ -1,6 +1,6 @@
 """Shared memory of a real-time run for its view: states of the nodes, and commands to them.
 
-As on the ``SharedPage`` each row is written by one process; a reader may see one half old and half new. The
+As in ``SharedPage``, one process writes each row, and a reader may see a row half old and half new. The
 memory exists only in a run with a view.
 """
 
@@ -18,11 +18,11 @@ from outrider.scene.view_commands import ViewCommands
 
 EVERY = 50_000
 """µs between two snapshots of a node."""
-_PLAN = 6 * KNOTS
-_ROW = 8 + _PLAN
-"""Columns: attitude (4), mode, age, plan's time, held plans, plan."""
-_WISHES = 7
-"""Columns: number of commands; methods as bits; loss; number of moves of the target, and its place (3)."""
+_PLAN_COLUMNS = 6 * KNOTS
+_ROW_COLUMNS = 8 + _PLAN_COLUMNS
+"""Columns: attitude (4), mode, age (s), CPU time of the plan (ms), held plans, plan (KNOTS x 6)."""
+_COMMAND_COLUMNS = 7
+"""Columns: number of commands; methods as bits; loss (0…1); number of moves of the target; last place (3)."""
 _METHODS = ViewCommands(methods="baseline+swivel+approach_angle+tangential").method_names
 
 
@@ -30,9 +30,9 @@ class Window:
     """Shared memory for ``vehicles`` vehicles; made before the processes fork."""
 
     def __init__(self, vehicles: int) -> None:
-        numbers = SharedMemory(0, _WISHES + vehicles * _ROW, 0).numbers
-        self._commands: NDArray[np.float64] = numbers[:_WISHES]
-        self._rows: NDArray[np.float64] = numbers[_WISHES:].reshape(vehicles, _ROW)
+        numbers = SharedMemory(0, _COMMAND_COLUMNS + vehicles * _ROW_COLUMNS, 0).numbers
+        self._commands: NDArray[np.float64] = numbers[:_COMMAND_COLUMNS]
+        self._rows: NDArray[np.float64] = numbers[_COMMAND_COLUMNS:].reshape(vehicles, _ROW_COLUMNS)
         self._rows[:] = np.nan
         self._commands[1:3] = np.nan
 
@@ -67,7 +67,7 @@ class Window:
         )
 
     def command(self, change: Change) -> None:
-        """Write a change for the processes, which read it at their next snapshot."""
+        """Write a change; companions read it at their next snapshot, the target at its next step."""
         found = self._commands
         if change.methods is not None:
             asked = ViewCommands(methods=change.methods).method_names
@@ -105,5 +105,5 @@ class Window:
 
     @property
     def place(self) -> Array:
-        """Place of the last move (3,), a copy."""
+        """Place to which the target was moved last (3,), fleet-local ENU, a copy."""
         return self._commands[4:7].copy()

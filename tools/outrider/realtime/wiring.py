@@ -1,6 +1,7 @@
 """Links of a real-time run, all on this machine's loopback.
 
-Vehicles and operator use unicast UDP, the swarm and the target multicast groups of their own.
+Autopilots, companions and operator use unicast UDP; the swarm and the target each use a port of one multicast
+group of this run.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ _HOST = "127.0.0.1"
 
 
 class Wiring(NamedTuple):
-    """Open links of all nodes, by node and link name.
+    """Open links of all nodes: for each node, its links by link name.
 
-    ``backup_nodes`` are those of the backup nodes.
+    ``autopilots`` and ``companions`` have one entry per vehicle, ``backup_nodes`` one per backup node.
     """
 
     autopilots: list[dict[str, list[Link]]]
@@ -31,7 +32,7 @@ class Wiring(NamedTuple):
     operator: dict[str, list[Link]]
 
     def close_others(self, own: dict[str, list[Link]]) -> None:
-        """Close every link but ``own``: a process keeps only those of its node."""
+        """Close every link except ``own``: a process keeps only the links of its node."""
         nodes = (
             *self.autopilots,
             *self.companions,
@@ -48,9 +49,9 @@ class Wiring(NamedTuple):
 
 
 def wire(vehicles: int, clock: Clock, moving: int = 0, backup_nodes: int = 0) -> Wiring:
-    """Open all links on free ports, also those of ``moving`` obstacles and of ``backup_nodes``.
+    """Open the links of ``vehicles``, ``moving`` obstacles and ``backup_nodes`` (numbers) on free ports.
 
-    Raises LinkError if one cannot be opened; then none stays open.
+    Raises LinkError if a link cannot be opened, after closing the others.
     """
     with ExitStack() as opened:
 
@@ -66,7 +67,7 @@ def wire(vehicles: int, clock: Clock, moving: int = 0, backup_nodes: int = 0) ->
         group = _group(_port(listening[0][0]))
         swarm, target = (f"mcast:{group}:{port},{_HOST}" for port in _free_ports(2))
         for vehicle, ground in listening:
-            # The autopilot sends first, as real ones do.
+            # As with real autopilots, the autopilot sends first.
             autopilots.append({"autopilot": [opening(f"udpout:{_HOST}:{_port(vehicle)}")]})
             companions.append(
                 {
@@ -105,15 +106,15 @@ def _port(link: Link) -> int:
 
 
 def _group(port: int) -> str:
-    """Return a multicast group (of those of RFC 2365 for local use) for this run only.
+    """Return a multicast group of the local scope (RFC 2365) for this run only.
 
-    It is unique, because no other run on this machine has the unicast ``port``.
+    It is unique on this machine, because no other run has the unicast ``port``.
     """
     return f"239.255.{port >> 8}.{port & 255}"
 
 
 def _free_ports(count: int) -> list[int]:
-    """Return free ports; all are bound at the same time, so that none is returned twice."""
+    """Return ``count`` different free UDP ports; they are free when this function returns."""
     with ExitStack() as held:
         sockets = [held.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)]
         for one in sockets:

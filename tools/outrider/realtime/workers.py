@@ -1,6 +1,6 @@
 """Process of a node: runs it under the wall clock over its links until the run ends.
 
-It also writes the node's state to the board, and leaves the results for the summary.
+It also writes the node's state to the board (``SharedPage``), and the results for the summary to a file.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ from outrider.simulation.targets import Target
 from sitl.node import Autopilot
 
 TOLERANCE = 1_000
-"""µs; a deadline whose step begins later is missed: a tenth of a companion's usual period."""
+"""Lateness (µs) above which a deadline is missed: a tenth of a companion's usual period."""
 
 
 @dataclass
 class ProcessResults:
-    """Results that a process leaves behind.
+    """Results of one process.
 
-    ``deadlines`` that passed, from the first step to the last; ``misses`` of them had no step within the
-    tolerance.
+    ``deadlines``: number of deadlines from the first step to the last; ``misses``: number of those without a
+    step within ``TOLERANCE``.
     """
 
     deadlines: int = 0
@@ -79,7 +79,7 @@ class Worker:
     """One node in its own process, with ``events`` that are applied after the goal event."""
 
     above = 0
-    """Levels of real-time priority above that of the others."""
+    """Real-time priority, in levels above that of the other workers."""
 
     def __init__(self, slot: NodeEnvironment, events: Iterable[Event] = ()) -> None:
         self.rough, self._scheduled, self.links, self._clock, self.board = slot
@@ -90,11 +90,11 @@ class Worker:
         self._taps: list[StepObserver] = []
 
     def over(self) -> bool:
-        """Return whether to end: it was requested, or the parent is gone."""
+        """Return whether to end: the parent requested it, or has ended itself."""
         return self.board.stop or os.getppid() != self._parent
 
     def excused(self) -> bool:
-        """Return whether the process was stopped on purpose since the last call."""
+        """Return whether the scenario stopped the process since the last call; then misses do not count."""
         return False
 
     def begin(self, now: int) -> None:
@@ -111,7 +111,7 @@ class Worker:
         path.write_bytes(pickle.dumps(self.remains))
 
     def main(self, directory: Path, priority: bool) -> None:
-        """Run the process from fork to exit."""
+        """Run the process from fork to exit; exit status 0, or 3 after an exception."""
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         if priority:
@@ -219,11 +219,11 @@ class CompanionWorker(Worker):
         self._last: Tally | None = None
 
     def over(self) -> bool:
-        """Return whether to end: also when this companion shall vanish."""
+        """Return whether to end; also true if this companion shall vanish."""
         return bool(self.board.gone[self._k]) or super().over()
 
     def excused(self) -> bool:
-        """Return whether the companion was frozen since the last call."""
+        """Return whether the companion was frozen and resumed since the last call."""
         before, self._thaws = self._thaws, int(self.board.thaws[self._k])
         return self._thaws != before
 
@@ -233,7 +233,7 @@ class CompanionWorker(Worker):
 
     def strike(self, event: Event) -> None:
         """Apply a partition to the companion's links."""
-        strike_computer(event, _Radio(self.rough))
+        strike_computer(event, _SwarmPartition(self.rough))
 
     def show(self, now: int) -> None:
         """Write the companion's state to the board and, if there is one, to the view."""
@@ -246,9 +246,9 @@ class CompanionWorker(Worker):
             self.board.show_companion(self._k, *shown)
         if self.board.window is not None and now >= self._next_glimpse:
             self._next_glimpse = now + EVERY
-            self._look_on(now, self.board.window)
+            self._update_view(now, self.board.window)
 
-    def _look_on(self, now: int, window: Window) -> None:
+    def _update_view(self, now: int, window: Window) -> None:
         """Write the node's snapshot for the view, and apply the view's commands."""
         window.show_companion(self._k, companion_snapshot(self._node, now))
         if window.commands == self._commands:
@@ -292,8 +292,8 @@ class PlayedWorker(Worker):
             self._node.move(now, window.place)
 
 
-class _Radio:
-    """Partitions of the swarm for one companion; the parent applies faults of whole processes."""
+class _SwarmPartition:
+    """Partitions of the swarm for one companion; the parent applies freezes and losses of processes."""
 
     def __init__(self, rough: ImpairedLink) -> None:
         self._rough = rough
@@ -302,10 +302,10 @@ class _Radio:
         """Do nothing: the parent stops the process."""
 
     def thaw(self, system: int) -> None:
-        """Do nothing: the parent resumes it."""
+        """Do nothing: the parent resumes the process."""
 
     def vanish(self, system: int) -> None:
-        """Do nothing: the parent ends it."""
+        """Do nothing: the process ends by ``SharedPage.gone``."""
 
     def cut(self, systems: tuple[int, ...]) -> None:
         self._rough.cut(map(names.companion, systems))

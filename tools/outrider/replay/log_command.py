@@ -60,7 +60,8 @@ def replay_log(log: Path, cast: Roles, like: str, out: Path | None, as_json: boo
 def chasing(log: Path, target: int, like: str, out: Path | None, as_json: bool) -> int:
     """Fly an own vehicle around ``target``, report what it was sent, and return 0.
 
-    The run and the same files are written to ``out``. Raises InputError as ``rehearsal`` does.
+    The run and the files of ``replay_log`` are written to ``out``. Raises InputError for a log that cannot be
+    read, for a target that is not in it, and for settings that cannot be flown.
     """
     try:
         seen = survey(read_tlog(log), target, str(log))
@@ -85,7 +86,7 @@ def _tell(title: str, found: ShadowRun, directory: Path, as_json: bool) -> None:
 
 
 def _directory(out: Path | None, stem: str) -> Path:
-    """Create a new, empty directory: ``out``, or the first free ``runs/replay-STEM``."""
+    """Create a new, empty directory: ``out``, or the first free ``runs/replay-STEM[-k]``."""
     return new_directory(out, f"replay-{stem}")
 
 

@@ -20,7 +20,7 @@ from outrider.replay.telemetry import Forwarder, paced
 from outrider.shadow.roles import Roles
 from outrider.terminal.share_progress import share_progress
 
-_ASKED = "allowed: --list, --own ID, --target ID, --to ENDPOINT, or the directory of a run"
+_ALLOWED_ACTIONS = "allowed: --list, --own ID, --target ID, --to ENDPOINT, or the directory of a run"
 
 
 class Request(NamedTuple):
@@ -39,7 +39,7 @@ class Request(NamedTuple):
     def run(self) -> int:
         """Run the replay and return the exit status.
 
-        Raises InputError for options that exclude each other.
+        Raises InputError for invalid options, for options that exclude each other, and as the actions do.
         """
         if self.speed is not None and not self.speed > 0.0:
             raise InputError(f"--speed {self.speed}: must be more than 0")
@@ -52,8 +52,8 @@ class Request(NamedTuple):
         if self.own is None:
             if self.to is None:
                 if not self.log.exists():
-                    raise InputError(f"{self.log}: no such file or directory; {_ASKED}")
-                raise InputError(f"replay {self.log}: what for is not said; {_ASKED}")
+                    raise InputError(f"{self.log}: no such file or directory; {_ALLOWED_ACTIONS}")
+                raise InputError(f"replay {self.log}: no action is given; {_ALLOWED_ACTIONS}")
             self._only("--to without --own", ("neighbours", "out"))
             return self._send()
         cast = Roles(self.own, _systems(self.neighbours), self.target)

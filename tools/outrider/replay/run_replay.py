@@ -18,14 +18,14 @@ from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 _ALLOWED = "allowed: what outrider swarm SCENARIO --out leaves"
-_OFTEN = 256
+_STEPS_PER_REPORT = 256
 """Number of steps between two progress reports."""
 
 Watch = Callable[[str, float], None]
 
 
 def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[Replayed, ...]:
-    """Re-run the companions of the run in ``directory``, made from its configuration, from its logs.
+    """Create the companions of the run in ``directory`` from its configuration; re-run them from its logs.
 
     ``watch`` receives the name of the log and the share that is done. Raises InputError where there is no
     run, or a vehicle's log or steps are missing.
@@ -42,7 +42,7 @@ def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[
         steps = read_steps(directory / names.steps(system)).tolist()
         shares = _Shares(watch, names.log(system), (k, len(fleet.systems)), len(steps))
         records = read_tlog(directory / names.log(system))
-        # Planning time is irrelevant here.
+        # The CPU clock returns 0: planning time is irrelevant here.
         companion = fleet.companion(k, lambda: 0)
         found.append(replay_companion(companion, (system, COMPONENT), steps, records, shares.step))
     return tuple(found)
@@ -58,6 +58,6 @@ class _Shares:
     def step(self, _now: int) -> None:
         """Count one more step."""
         self._done += 1
-        if self._done % _OFTEN == 0 or self._done == self._steps:
+        if self._done % _STEPS_PER_REPORT == 0 or self._done == self._steps:
             before, logs = self._which
             self._watch(self._name, (before + self._done / self._steps) / logs)

@@ -21,8 +21,8 @@ from outrider.simulation.preparation import Prepared
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
-_ROOM = 20.0
-"""Margin around all positions of the target that is flown in (m)."""
+_MARGIN_M = 20.0
+"""Horizontal margin of the flight box beyond the target's positions (m)."""
 _LONGEST_S = 3600.0
 
 
@@ -35,7 +35,7 @@ def prepared(log: Path, seen: OwnRecords, target: int, like: str) -> Prepared:
     """
     base = load(find("scenarios", like), Scenario)
     limits, fleet = base.companion.limits, seen.fleet
-    far = seen.reach + _ROOM
+    far = seen.reach + _MARGIN_M
     box = {"box_min": (-far, -far, limits.box_min[2]), "box_max": (far, far, limits.box_max[2])}
     companion = base.companion.model_dump() | {"task": "escort", "limits": limits.model_dump() | box}
     origin = Origin(latitude=fleet.latitude, longitude=fleet.longitude, altitude=fleet.altitude)

@@ -1,8 +1,8 @@
 """Telemetry of a log, sent to a live link: reports of vehicles, never requests or commands.
 
 A log also holds the commands, set-points, parameters and missions of ground stations; sent again they would
-fly a real vehicle. So messages are selected by a list of those that request nothing. They are sent only for
-senders that are no ground station: the system ids of the log that send a vehicle's heartbeat.
+fly a real vehicle. So messages are selected by a list of those that request nothing. A component's messages
+are sent only after a heartbeat of it, if its last heartbeat is not a ground station's.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ TELEMETRY: Final = frozenset(
     )
 )
 """Ids of messages that report and request nothing."""
-_TYPE_AT = 4
+_TYPE_OFFSET = 4
 """Offset of MAV_TYPE in a HEARTBEAT's payload."""
-_PAYLOAD: Final[dict[int, int]] = {
+_PAYLOAD_OFFSETS: Final[dict[int, int]] = {
     mavlink.PROTOCOL_MARKER_V1: mavlink.HEADER_LEN_V1,
     mavlink.PROTOCOL_MARKER_V2: mavlink.HEADER_LEN_V2,
 }
@@ -77,12 +77,16 @@ class Forwarder:
         """Numbers of frames that were sent, and that were not."""
 
     def take(self, frame: bytes) -> None:
-        """Send ``frame`` if it is a vehicle's telemetry."""
+        """Send ``frame``, without its signature, if it is a vehicle's telemetry."""
         # A listening link learns its destinations from what it receives; the content is ignored.
         self._link.receive()
         system, component, message_id = header(frame)
         if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-            kind = frame[_PAYLOAD[frame[0]] + _TYPE_AT] if len(frame) > _PAYLOAD[frame[0]] + _TYPE_AT else 0
+            kind = (
+                frame[_PAYLOAD_OFFSETS[frame[0]] + _TYPE_OFFSET]
+                if len(frame) > _PAYLOAD_OFFSETS[frame[0]] + _TYPE_OFFSET
+                else 0
+            )
             if kind == mavlink.MAV_TYPE_GCS:
                 self._vehicles.discard((system, component))
             else:
@@ -99,7 +103,8 @@ def paced(
 ) -> Iterator[Record]:
     """Yield the records on one time line (see ``timeline``), each no earlier than its time.
 
-    ``speed`` is a multiple of the log's (None: without waiting). Long silence is shortened.
+    ``speed`` is a multiple of the log's (None: without waiting). Silence is shortened to 5 s of the log.
+    ``forwarder`` takes each record's frame when it is due.
     """
     before: int | None = None
     due = clock.now()

@@ -11,9 +11,9 @@ from outrider.report.run import Array, Motions, Plans, PlanTimes
 from outrider.runs.array_file import Shapes, read_arrays
 from outrider.runs.arrays import motion_shapes
 
-_LONGEST = 1e5
+_MAX_TIME_S = 1e5
 """Largest time (s) from the goal event."""
-_FAR = 1e9
+_MAX_MAGNITUDE = 1e9
 """Largest magnitude (m, m/s, rad): more is damage."""
 
 _MOTIONS = motion_shapes("K", "M")
@@ -27,14 +27,16 @@ def motions(path: Path) -> Motions:
     time = arrays["time_s"]
     if not len(time):
         raise InputError(f"{path.name}: holds no sample")
-    if not (np.abs(time) < _LONGEST).all():
-        raise InputError(f"{path.name}: time_s is not within {_LONGEST:g} s of the goal event")
+    if not (np.abs(time) < _MAX_TIME_S).all():
+        raise InputError(f"{path.name}: time_s is not within {_MAX_TIME_S:g} s of the goal event")
     if not (np.diff(time) > 0.0).all():
         raise InputError(f"{path.name}: time_s does not rise")
     system = tuple(arrays["system"].astype(int).tolist())
     # An infinite separation means that no pair is in the air; other values out of range are unknown.
     rest = [
-        arrays[name] if name == "separation" else np.where(np.abs(arrays[name]) < _FAR, arrays[name], np.nan)
+        arrays[name]
+        if name == "separation"
+        else np.where(np.abs(arrays[name]) < _MAX_MAGNITUDE, arrays[name], np.nan)
         for name in _MOTIONS
         if name not in ("system", "time_s")
     ]
@@ -45,7 +47,7 @@ def plans(path: Path) -> Plans:
     """Read ``plans.npz``. Raises InputError."""
     arrays = _read(path, _PLANS)
     gradient = arrays["gradient"]
-    size = np.linalg.norm(np.where(np.abs(gradient) < _FAR, gradient, np.nan), axis=1)
+    size = np.linalg.norm(np.where(np.abs(gradient) < _MAX_MAGNITUDE, gradient, np.nan), axis=1)
     return Plans(arrays["system"].astype(np.int64), arrays["time_s"], size)
 
 

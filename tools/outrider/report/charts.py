@@ -68,7 +68,7 @@ def charts(
 ) -> list[Chart]:
     """Return all charts that have data, over the samples ``shown`` (n,).
 
-    ``late`` is by how many s a vehicle's clock is ahead (``clocks.errors``): plans are dated by that clock.
+    ``late`` (s), by system id: how much a vehicle's clock is ahead (``clocks.errors``); plans have its time.
     """
     found = [_separation(run, motions, shown)]
     where = _where(run, motions)
@@ -80,7 +80,7 @@ def charts(
         note = "between the nose and the bearing of the true target"
         found.append(Chart("yaw", "Yaw error", "°", note, _lines(motions, errors[shown])))
     tracking = np.linalg.norm(motions.position - motions.reference, axis=-1)
-    note = "between the true place and what the autopilot follows: its control error and its estimate's"
+    note = "between the true position and the autopilot's reference: sum of control and estimation errors"
     found.append(Chart("tracking", "Tracking error", "m", note, _lines(motions, tracking[shown])))
     if run.plans is not None and len(run.plans.time):
         found.append(_gradients(run.plans, motions, shown, late))
@@ -151,7 +151,7 @@ def _gradients(plans: Plans, motions: Motions, shown: np.ndarray, late: Mapping[
         if own.any():
             values = largest(plans.time[own] - late.get(system, 0.0), plans.size[own], motions.time[shown])
             lines.append(Line(str(system), system, values))
-    note = "of every plan, divided by Ω_t: near 0 where a vehicle is done"
+    note = "of every plan, divided by Ω_t; near 0 when a vehicle has converged"
     return Chart("gradient", "‖∇J‖", "m", note, tuple(lines), bent=0.1)
 
 
@@ -160,5 +160,5 @@ def _loss(losses: Losses, time: Array) -> Chart:
     inside = (place >= 0) & (place < len(losses.by_second))
     values = np.full(len(time), np.nan)
     values[inside] = 100.0 * losses.by_second[place[inside]]
-    note = "share of the messages told in each second that did not arrive, over all pairs"
+    note = "share of the messages sent in each second that did not arrive, over all pairs"
     return Chart("loss", "Message loss", "%", note, (Line("swarm link", None, values),))

@@ -16,9 +16,9 @@ from outrider.report.run import Array, Log, Motions, Times
 REACH = 5.0
 """Largest difference (s) between the starts of log and flight."""
 _COARSE, _FINE = 0.1, 0.005
-_STILL = 0.05
+_MIN_SPEED = 0.05
 """Speed (m/s) that a vehicle must have reached for a fit."""
-_MOST = 3000
+_MAX_VELOCITIES = 3000
 """Approximate number of velocities used; so many suffice."""
 
 
@@ -33,9 +33,9 @@ def offset(log: Log, motions: Motions) -> float:
         return guess
     k = motions.system.index(log.owner)
     true = np.nan_to_num(motions.velocity[:, k])
-    step = max(1, len(log.moments) // _MOST)
+    step = max(1, len(log.moments) // _MAX_VELOCITIES)
     sent, when = log.speeds[::step], (log.moments[::step] - log.begin) * 1e-6
-    if float(np.abs(sent).max()) < _STILL:
+    if float(np.abs(sent).max()) < _MIN_SPEED:
         return guess
     for width, grid in ((REACH, _COARSE), (_COARSE, _FINE)):
         candidates = guess + grid * np.arange(-round(width / grid), round(width / grid) + 1.0)

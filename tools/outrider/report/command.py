@@ -80,7 +80,7 @@ def make(directory: Path, watch: Watch = lambda _what, _share: None) -> ReportPa
 
 
 def _d_min(run: Run) -> float:
-    """Return d_min (m); 0, below which no distance is, where it is not known."""
+    """Return d_min (m); 0 if it is unknown, so that no distance violates it."""
     said = run.summary.get("d_min_m") if run.scenario is None else run.scenario.d_min
     return float(said) if isinstance(said, int | float) else 0.0
 
@@ -120,10 +120,10 @@ def check(path: Path) -> None:
         raise InputError(f"{path}: there is no folder {path.parent}")
     if path.is_symlink() or path.exists():
         if not path.is_file():
-            raise InputError(f"{path}: is there, and no report; nothing is overwritten")
+            raise InputError(f"{path}: exists and is not a report; nothing is overwritten")
         with path.open("rb") as file:
             if MARK.encode() not in file.read(1024):
-                raise InputError(f"{path}: is there, and no report; nothing is overwritten")
+                raise InputError(f"{path}: exists and is not a report; nothing is overwritten")
 
 
 def write(path: Path, text: str) -> None:

@@ -12,9 +12,9 @@ from companion.obstacles.static import FixedObstacles
 from outrider.report.run import Array, Motions
 from outrider.scenarios.scenario import Scenario
 
-_ALOFT = 0.2
+_MIN_HEIGHT = 0.2
 """Height (m) below which a vehicle may stand on the ground beside the target or an obstacle."""
-_BESIDE = 0.1
+_MERGE_S = 0.1
 """Time (s) around an encounter that counts as part of it."""
 
 
@@ -66,7 +66,7 @@ def encounters(motions: Motions, d_min: float, scenario: Scenario | None) -> lis
         found += _below(motions.time, np.where(flies, apart, np.inf), d_min, (one, other))
     for index in np.flatnonzero(motions.separation < d_min).tolist():
         time = float(motions.time[index])
-        if not any(one.begin - _BESIDE <= time <= one.end + _BESIDE for one in found):
+        if not any(one.begin - _MERGE_S <= time <= one.end + _MERGE_S for one in found):
             least = float(motions.separation[index])
             found.append(Encounter(time, time, time, least, d_min, _nearest(motions, index)))
     if scenario is not None:
@@ -79,7 +79,7 @@ def _others(motions: Motions, scenario: Scenario) -> list[Encounter]:
     limit, surface = scenario.d_min_target, scenario.d_min_obstacle
     near_target, near_obstacle = to_target(motions), to_obstacles(motions, scenario)
     for k, system in enumerate(motions.system):
-        aloft = motions.position[:, k, 2] > _ALOFT
+        aloft = motions.position[:, k, 2] > _MIN_HEIGHT
         if limit is not None:
             apart = np.where(aloft, near_target[:, k], np.inf)
             found += _below(motions.time, apart, limit, (system, "the target"))

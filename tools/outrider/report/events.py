@@ -15,7 +15,7 @@ from outrider.scenarios.scenario import Scenario
 
 TOGETHER = 0.5
 """Time (s) within which equal events of several vehicles are merged."""
-_BACK = 64
+_MAX_LOOKBACK = 64
 """Number of earlier events searched for an equal one."""
 
 
@@ -52,7 +52,7 @@ def together(found: Sequence[Event]) -> list[Event]:
     merged: list[Event] = []
     for event in found:
         place = len(merged) - 1
-        while place >= max(0, len(merged) - _BACK) and event.time - merged[place].time <= TOGETHER:
+        while place >= max(0, len(merged) - _MAX_LOOKBACK) and event.time - merged[place].time <= TOGETHER:
             other = merged[place]
             alike = (other.kind, other.text, other.until, other.bad) == event[1:2] + event[3:]
             if alike and not set(other.who) & set(event.who):
@@ -72,7 +72,7 @@ def _goal(run: Run) -> Iterator[Event]:
         yield Event(0.0, "goal", (), "the goal event" if has_goal else "the clock starts")
     converged = run.summary.get("convergence_time_s")
     if isinstance(converged, int | float):
-        yield Event(float(converged), "converged", (), "everybody is where it should be, and stays")
+        yield Event(float(converged), "converged", (), "all vehicles are in place, and stay")
 
 
 def _encounters(near: Sequence[Encounter]) -> Iterator[Event]:

@@ -16,15 +16,15 @@ class Term(NamedTuple):
 TERMS = {
     "scenario": Term("scenario", "", ""),
     "method": Term("method", "", "the way out of the field's local minima"),
-    "avoidance": Term("avoidance", "", "field: the paper's; certified: committed plans, apart by proof"),
+    "avoidance": Term("avoidance", "", "field: the paper's; certified: plans with proven separation"),
     "planar": Term("planar", "", "whether heights were fixed"),
     "turning_sense": Term("turning sense", "", "own: each by its own approach; right, left: one for all"),
     "seed": Term("seed", "", "of starts, noise, clocks and link faults"),
     "vehicles": Term("vehicles", "", "with bystanders"),
-    "sensors": Term("sensors", "", "what the autopilots flew on"),
-    "converged": Term("converged", "", "everybody where it should be, and slow, for one second"),
+    "sensors": Term("sensors", "", "sensor profile of the autopilots"),
+    "converged": Term("converged", "", "all vehicles in place, and slow, for one second"),
     "convergence_time_s": Term("time to converge", "s", "start of that second, after the goal event"),
-    "failure": Term("failure", "", "why the flight did not come about, or who fell, or did not come down"),
+    "failure": Term("failure", "", "reason why the flight failed, or vehicles that fell or did not land"),
     "min_separation_m": Term(
         "least separation", "m", "of two vehicles' centres, true, at every physics step"
     ),
@@ -41,15 +41,15 @@ TERMS = {
     "standoff_error_m": Term("stand-off error", "m", "distance from the surface around the true target"),
     "yaw_error_deg": Term("yaw error", "°", "between the nose and the bearing of the true target"),
     "tracking_error_m": Term(
-        "tracking error", "m", "between where the autopilot believes to be and what it follows"
+        "tracking error", "m", "between the autopilot's estimated position and its reference"
     ),
     "estimate_error_m": Term(
-        "error of the estimate", "m", "between where the autopilot believes to be and is"
+        "error of the estimate", "m", "between the autopilot's estimated and true position"
     ),
     "plan_ms": Term("CPU time of a plan", "ms", "neighbours to plan"),
     "plans": Term("plans", "", "made while the clock ran"),
     "solver_failures": Term("solver failures", "", "the old plan is held, then the vehicle brakes"),
-    "relaxed_qps": Term("relaxed QPs", "", "plans in which a state limit had to give way"),
+    "relaxed_qps": Term("relaxed QPs", "", "plans in which a state limit was relaxed"),
     "held_epochs": Term("held plans", "", "times a plan was due and the old one was kept"),
     "anchored_anew": Term("anchored anew", "", "times a plan started anew from where the vehicle was"),
     "slack_max_m": Term("largest slack", "m", ""),

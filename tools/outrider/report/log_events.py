@@ -12,7 +12,7 @@ from outrider.logs.flight_modes import is_armed, mode_of
 from outrider.report.run import Log
 
 _SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
-_PIECE = 50
+_PIECE_LENGTH = 50
 """A STATUSTEXT of this length continues in the next one."""
 
 
@@ -31,7 +31,8 @@ class LogEvent(NamedTuple):
 def sayings(log: Log) -> Iterator[LogEvent]:
     """Yield the events in the order of the log.
 
-    The first heartbeat gives the initial state. A long STATUSTEXT that arrives in pieces is joined.
+    The first heartbeat gives the initial state. Successive pieces of a long STATUSTEXT with the same time
+    are joined.
     """
     before: Heartbeat | None = None
     text: LogEvent | None = None
@@ -43,7 +44,7 @@ def sayings(log: Log) -> Iterator[LogEvent]:
                 if text is not None:
                     yield text
                 text = _text(time, said)
-            if len(said.text) < _PIECE:
+            if len(said.text) < _PIECE_LENGTH:
                 yield text
                 text = None
             continue

@@ -23,9 +23,9 @@ _DECODED = {
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
     mavlink.MAVLINK_MSG_ID_STATUSTEXT,
 }
-_LATEST = 1 << 62
+_MAX_TIME_US = 1 << 62
 """Latest time (µs): a damaged time stamp may exceed a 64-bit integer."""
-_OFTEN = 4096
+_PROGRESS_RECORDS = 4096
 """Number of records between two progress reports."""
 
 
@@ -38,7 +38,7 @@ def read_log(owner: int, path: Path, at: Callable[[int], None] = lambda _bytes: 
     reader, size = read_tlog(path), 0
     for number, record in enumerate(reader):
         size += 8 + len(record.frame)
-        if number % _OFTEN == 0:
+        if number % _PROGRESS_RECORDS == 0:
             at(size)
         pass_.see(record)
     return pass_.log(reader.report)
@@ -51,7 +51,7 @@ def sequence_and_sender(frame: bytes) -> tuple[int, Sender]:
     return frame[2], Sender(frame[3], frame[4])
 
 
-class _Growing:
+class _StreamBuffer:
     """Buffer of a stream: 17 bytes for each message of any length."""
 
     def __init__(self) -> None:
@@ -76,8 +76,8 @@ class _Pass:
         self._owner = owner
         self._begin = self._end = 0
         self._first = True
-        self._sent = _Growing()
-        self._received: dict[Sender, _Growing] = {}
+        self._sent = _StreamBuffer()
+        self._received: dict[Sender, _StreamBuffer] = {}
         self._codec = Codec(lambda identifier, system, _component: identifier in _DECODED and system == owner)
         self._moments = array("q")
         self._speeds = array("d")
@@ -85,7 +85,7 @@ class _Pass:
 
     def see(self, record: Record) -> None:
         """Process the next record."""
-        time = min(record.time, _LATEST)
+        time = min(record.time, _MAX_TIME_US)
         if self._first:
             self._begin = self._end = time
             self._first = False
@@ -95,7 +95,7 @@ class _Pass:
             if sender.system == self._owner:
                 self._sent.add(time, sequence, record.frame)
             else:
-                self._received.setdefault(sender, _Growing()).add(time, sequence, record.frame)
+                self._received.setdefault(sender, _StreamBuffer()).add(time, sequence, record.frame)
             return
         for message in self._codec.feed(record.frame):
             self._receive(time, message)

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from outrider.report.run import Array, Log, Stream, Times
 
 MODULO = 256
-_LONGEST = 86_400.0
+_MAX_TIME_S = 86_400.0
 """Limit of time (s) before and after the goal event: a damaged time stamp may have any value."""
-_PAUSE = 2.0
+_LONG_PAUSE_S = 2.0
 """Time (s) in which no sender sends 128 messages; after more, whole cycles of numbers may be missing."""
 
 
@@ -29,8 +29,8 @@ class LossRate(NamedTuple):
 
     ``exact`` is true if the sender's own log was used, and false if its sequence numbers were. The other
     values count from the goal event on, if that is known: ``silence`` is the longest time (s) without a
-    message until the sender sent its last; ``usual`` is the time (s) within which 95 % of the arrivals follow
-    the one before. They are None if too few messages arrived.
+    message until the sender sent its last; ``usual`` is the 95th percentile of the times (s) between
+    arrivals. They are None if too few messages were sent or arrived.
     """
 
     sender: int
@@ -110,7 +110,10 @@ class LossComparison:
 
 
 class _SenderLog(NamedTuple):
-    """``log`` without received messages, the offset ``ahead`` of its clock (s), and its goal event (µs)."""
+    """``log`` without received messages, the offset ``ahead`` of its clock (s), and ``goal`` (µs by it).
+
+    ``goal`` is the goal event, or the start of the log if that is later.
+    """
 
     log: Log
     ahead: float
@@ -126,7 +129,7 @@ class _Seconds:
 
     def add(self, ours: Array, lost: NDArray[np.bool_]) -> None:
         """Add messages sent at ``ours`` (n,), s on the flight's clock; ``lost`` (n,) marks the lost ones."""
-        sane = np.abs(ours) < _LONGEST
+        sane = np.abs(ours) < _MAX_TIME_S
         for counter, times in ((self._sent, ours[sane]), (self._lost, ours[sane & lost])):
             seconds, counts = np.unique(np.floor(times).astype(np.int64), return_counts=True)
             for second, count in zip(seconds.tolist(), counts.tolist(), strict=True):
@@ -199,7 +202,7 @@ def unwrapped(stream: Stream) -> Times:
     steps = np.diff(numbers)
     steps = (steps + MODULO // 2) % MODULO - MODULO // 2
     waits = np.diff(stream.time) * 1e-6
-    often = (waits >= 0.0) & (waits < _PAUSE)
+    often = (waits >= 0.0) & (waits < _LONG_PAUSE_S)
     if waits[often].sum() > 0.0:
         rate = max(0.0, float(steps[often].sum() / waits[often].sum()))
         rounds = np.round((waits * rate - steps) / MODULO).astype(np.int64)

@@ -1,7 +1,7 @@
 """HTML page: a template, styles and scripts from ``static/``, and the parts made from a run.
 
-The page loads nothing from elsewhere. Its content security policy enforces that in the browser, and permits
-only the script whose hash it names: text from a log stays text.
+The page loads no other resources. Its content security policy makes the browser block requests, and permits
+only the style and the script with the given hashes, so that text from a log is never executed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from importlib.resources import files
 from outrider.report.headline import Headline
 
 MARK = '<meta name="generator" content="outrider report">'
-"""Marks a page as one of these reports."""
+"""HTML tag by which ``outrider report`` recognises its own pages."""
 STYLES = ("page.css", "charts.css", "print.css")
 SCRIPTS = (
     "data.js",
@@ -34,15 +34,15 @@ SCRIPTS = (
 
 
 def static(name: str) -> str:
-    """Return a file of the page."""
+    """Return the text of the file ``name`` in ``static/``."""
     return (files("outrider.report") / "static" / name).read_text(encoding="utf-8")
 
 
 def page(title: str, headline: Headline, parts: Mapping[str, str], document: str | None) -> str:
     """Return the whole page.
 
-    ``parts`` are HTML by their names in the template; ``document`` is the replay's JSON, or None if there is
-    nothing to replay.
+    ``parts``: HTML by the names of the placeholders in the template. ``document``: the replay as JSON, or
+    None to hide the replay and the charts.
     """
     style = "\n".join(static(name) for name in STYLES)
     script = '"use strict";\n(() => {\n' + "\n".join(static(name) for name in SCRIPTS) + "\n})();"

@@ -1,6 +1,6 @@
 """Data that the page's script draws, as one JSON document.
 
-An array is text in it: multiples of a quantum as small integers in base64.
+An array is stored as text: the base64 of little-endian integers, multiples of a quantum.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ class EventMessage(NamedTuple):
 class Log(NamedTuple):
     """Data of one vehicle's tlog.
 
-    ``begin``, ``end``: first and last record, µs on the vehicle's own clock. ``told``: messages that the
+    ``begin``, ``end``: first and last record, µs on the vehicle's own clock. ``sent``: messages that the
     vehicle sent on the swarm link; ``received``: messages that it received there, empty if they have already
     been compared. ``speeds`` (n, 3): velocity reported by the autopilot at ``moments`` (n,) µs, ENU, m/s.
     """

@@ -13,7 +13,7 @@ from outrider.scenarios.starts import starts
 
 SPAN = 0.63
 """Default span (m) from tip to tip: the firefly's."""
-_LARGEST = 100.0
+_MAX_SPAN = 100.0
 
 
 def scene(run: Run, motions: Motions) -> dict[str, Any]:
@@ -25,7 +25,7 @@ def scene(run: Run, motions: Motions) -> dict[str, Any]:
     scenario, span = run.scenario, run.summary.get("span_m")
     d_min = run.summary.get("d_min_m") if scenario is None else scenario.d_min
     return {
-        "span": float(span) if isinstance(span, int | float) and 0.0 < span < _LARGEST else SPAN,
+        "span": float(span) if isinstance(span, int | float) and 0.0 < span < _MAX_SPAN else SPAN,
         "dMin": float(d_min) if isinstance(d_min, int | float) else None,
         "fixed": [] if scenario is None else [dict(_fixed(one)) for one in scenario.obstacles],
         "movers": []

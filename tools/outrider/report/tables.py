@@ -14,7 +14,7 @@ from outrider.report.run import Gap
 MOST_EVENTS = 2000
 _LEVELS = (0.0, 0.01, 0.05, 0.1, 0.2, 0.4, 0.7)
 """Shares of loss at which the shading of a cell increases."""
-_SILENT = (0.0, 0.3, 0.5, 1.0, 2.0, 4.0, 8.0)
+_SILENCES = (0.0, 0.3, 0.5, 1.0, 2.0, 4.0, 8.0)
 """Times without a message (s) at which the shading of a cell increases."""
 
 
@@ -75,11 +75,11 @@ def loss_tables(losses: Losses) -> str:
     """Return tables of losses and of longest silences, senders in rows, receivers in columns."""
     ways = {(way.sender, way.receiver): way for way in losses.ways}
     if not ways:
-        return "<p>No log tells of messages on the swarm link.</p>"
+        return "<p>No log has messages of the swarm link.</p>"
     shares = _matrix(ways, "lost, %", _share_cell)
     silences = _matrix(ways, "longest silence after the goal event, s", _silence_cell)
     guessed = any(not way.exact for way in losses.ways)
-    note = "<p class=note>≈ by the gaps in the sender's numbers: it left no log.</p>" if guessed else ""
+    note = "<p class=note>≈ from gaps in the sequence numbers: the sender has no log.</p>" if guessed else ""
     return f"<div class=matrices>{shares}{silences}</div>{note}"
 
 
@@ -112,7 +112,7 @@ def _silence_cell(way: LossRate) -> str:
         return _cell("–", 0, f"{way.sender} to {way.receiver}: nothing was heard")
     usual = "" if way.usual is None else f"; 95 % of the messages came within {way.usual:.2f} s of the last"
     sent = f"{way.sender} to {way.receiver}: {way.silence:.2f} s without a message{usual}"
-    return _cell(f"{way.silence:.2f}", _level(way.silence, _SILENT), sent)
+    return _cell(f"{way.silence:.2f}", _level(way.silence, _SILENCES), sent)
 
 
 def _cell(text: str, level: int, sent: str) -> str:

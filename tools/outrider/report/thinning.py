@@ -1,6 +1,6 @@
 """Selection of the samples shown on the page: 25 per second, or fewer if there would be too many.
 
-Minima and maxima between two samples are kept.
+``least`` and ``largest`` give the minima and maxima between two samples.
 """
 
 from __future__ import annotations

@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 from outrider.errors import Fault, InputError
 
 MOST_BYTES = 1 << 30
-"""Largest total size of a file's arrays: an hour of a hundred vehicles at 50 Hz has half of it."""
+"""Largest total size (bytes) of a file's arrays, uncompressed.
+
+An hour of a hundred vehicles at 50 Hz takes about three quarters of it.
+"""
 _ALLOWED = "allowed: a file written by this version of outrider"
 
-_DAMAGE = (
+_READ_ERRORS = (
     OSError,
     ValueError,
     TypeError,
@@ -53,7 +56,7 @@ def read_arrays(path: Path, shapes: Shapes) -> Arrays:
             for name in shapes:
                 if name in file:
                     found[name] = file[name]
-    except _DAMAGE as error:
+    except _READ_ERRORS as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise _fault(path, f"cannot be read: {reason or type(error).__name__}; {_ALLOWED}") from None
     sizes: dict[str, int] = {}

@@ -106,5 +106,5 @@ def _unix(path: Path, start_us: int, seconds: Array) -> Whole:
     with np.errstate(invalid="ignore", over="ignore"):
         later = seconds * 1e6 + start_us
     if not ((later >= 0.0) & (later <= LATEST)).all():
-        raise InputError(Fault(str(path), "array time_s holds what is no time"))
+        raise InputError(Fault(str(path), "array time_s holds an invalid time"))
     return start_us + np.rint(seconds * 1e6).astype(np.int64)

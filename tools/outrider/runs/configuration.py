@@ -38,8 +38,8 @@ def resolved(directory: Path, allowed: str, of_log: str | None = None) -> Resolv
 def configured(directory: Path, allowed: str, of_log: str | None) -> Resolved:
     """Return the configuration of the run in ``directory``, which must exist.
 
-    The output of ``outrider fly`` has no scenario. Its InputError states how its log can be used instead:
-    ``of_log``, with the log in place of ``{}``; None: not at all.
+    Raises InputError if it cannot be read or has no scenario, as the output of ``outrider fly``. For the
+    latter the error names ``of_log``, with the log's path in place of ``{}``; for None it names ``allowed``.
     """
     path = directory / CONFIGURATION
     try:

@@ -16,8 +16,8 @@ from outrider.scenarios.scenario import TARGET_SYSTEM
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_NAMED = 24
-"""Number of vehicles; the names of more would cover the figure."""
+_MAX_NAMED_VEHICLES = 24
+"""Largest number of vehicles that are named; the names of more would cover the figure."""
 
 
 @coloured
@@ -56,13 +56,13 @@ def _headline(flight: Outcome, summary: dict[str, Value]) -> str:
 
 
 def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
-    """Draw the paths from above, with obstacles and the surface around the target's last position.
+    """Draw all paths from above, with obstacles and the surface around the target's last position.
 
-    The paths of moving obstacles are drawn, too.
+    Moving obstacles are drawn with their paths.
     """
     from matplotlib.patches import Circle
 
-    few = len(flight.systems) <= _NAMED
+    few = len(flight.systems) <= _MAX_NAMED_VEHICLES
     for k, system in enumerate(flight.systems):
         name = f"{system}" if few else "_nolegend_"
         of = hex_of(k)
@@ -91,7 +91,7 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
 
 
 def _separation(axes: Axes, flight: Outcome, samples: Samples, time: np.ndarray) -> None:
-    """Draw the least distance of any pair at every physics step, with d_min and the vehicles' own size."""
+    """Draw the least distance of any pair since the previous sample, with d_min and the vehicles' span."""
     separation = np.where(np.isfinite(samples.separation), samples.separation, np.nan)
     axes.plot(time, separation, lw=1.2, color="C0", label="vehicle to vehicle")
     offset = np.linalg.norm(samples.position - samples.target[:, None], axis=-1).min(axis=1)
@@ -105,7 +105,7 @@ def _separation(axes: Axes, flight: Outcome, samples: Samples, time: np.ndarray)
 
 
 def _errors(standoff: Axes, yaw: Axes, flight: Outcome, samples: Samples, time: np.ndarray) -> None:
-    """Draw the position error and the yaw error of each vehicle, from the clock's start on.
+    """Draw the position error and the yaw error of each vehicle, from the clock's start to its end.
 
     The yaw error is the angle between a vehicle's heading and the direction to the target.
     """
@@ -139,7 +139,7 @@ def _gradients(axes: Axes, flight: Outcome) -> None:
 
 
 def _plan_time(axes: Axes, flight: Outcome) -> None:
-    """Draw the histogram of the CPU time of all plans while the clock ran."""
+    """Draw the histogram of the CPU time of all plans between the clock's start and its end."""
     tallies = flight.tallies
     values = np.array([n for before, after in tallies for n in after.plan_ns[len(before.plan_ns) :]]) * 1e-6
     if len(values):

@@ -20,7 +20,7 @@ def write_flight(flight: Outcome, path: Path) -> None:
     """
     samples = flight.truth.samples()
     start = flight.clock_start or (int(samples.time[0]) if len(samples.time) else 0)
-    values = {name: getattr(samples, name).astype(np.float32) for name in _KEPT}
+    values = {name: getattr(samples, name).astype(np.float32) for name in _SAMPLE_FIELDS}
     np.savez_compressed(
         path,
         system=np.array(flight.systems),
@@ -31,7 +31,7 @@ def write_flight(flight: Outcome, path: Path) -> None:
 
 
 def write_plan_times(flight: Outcome, path: Path) -> None:
-    """Write the CPU time ``plan_ms`` (n,) of each plan while the clock ran.
+    """Write the CPU time ``plan_ms`` (n,) of each plan between the clock's start and its end.
 
     ``time_s`` (n,): when the plan was due, after the goal event on the companion's clock; ``system`` (n,):
     its vehicle.
@@ -63,4 +63,4 @@ def write_plans(flight: Outcome, path: Path) -> None:
     )
 
 
-_KEPT = ("position", "velocity", "reference", "yaw", "tilt", "target", "separation", "moving")
+_SAMPLE_FIELDS = ("position", "velocity", "reference", "yaw", "tilt", "target", "separation", "moving")

@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 
 
 def standoff(scenario: Scenario, positions: Array, target: Array) -> Array:
-    """Return the distance (…, K) in m of each vehicle with the task from its own surface.
+    """Return the distance (…, K) in m of each vehicle from its own surface around the target.
 
-    ``positions`` (…, K, 3); the surfaces are around ``target`` (…, 3).
+    ``positions`` (…, K, 3) in the order of the scenario's systems; ``target`` (…, 3); fleet-local ENU, m.
     """
     offset = positions - target[..., None, :]
     result = np.empty(offset.shape[:-1])

@@ -23,8 +23,8 @@ Position, velocity, acceleration, reference, error of the autopilot's estimate (
 """
 NOWHERE = np.full(3, np.nan)
 NOWHERE.flags.writeable = False
-_TOGETHER = 10_000
-"""Approximate number of distances that are computed at once."""
+_BATCH_DISTANCES = 10_000
+"""Approximate number of distances above which the collected samples are processed."""
 
 
 class Samples(NamedTuple):
@@ -60,7 +60,7 @@ class Limits(NamedTuple):
 
 
 class Encounters:
-    """Counter of how often pairs come below a distance; one stay below it is one encounter."""
+    """Counter of encounters: each uninterrupted time of a pair below the distance ``least`` (m) is one."""
 
     def __init__(self, pairs: int, least: float) -> None:
         self._least = least
@@ -74,7 +74,7 @@ class Encounters:
         self.minimum = min(self.minimum, least)
         if least < self._least or self._below.any():
             below = np.vstack([self._below, distances < self._least])
-            # A pair with unknown distance for a moment keeps its last state.
+            # A pair keeps its last state while its distance is unknown.
             unknown = np.isnan(distances)
             for step in np.flatnonzero(unknown.any(axis=1)):
                 below[step + 1] |= below[step] & unknown[step]
@@ -83,7 +83,7 @@ class Encounters:
 
 
 class GroundTruth:
-    """Collector of the ground truth of ``vehicles``: every physics step, and a sample now and then.
+    """Collector of the ground truth of ``vehicles``: positions at every physics step, and periodic samples.
 
     Distances are computed for many samples at once, when there are enough of them or when they are requested.
     """
@@ -141,7 +141,7 @@ class GroundTruth:
         self._tracks.append(track)
         self._places.append(target)
         self._moved.append(moving)
-        if len(self._tracks) * len(track) * (1 + len(self._pairs[0])) > _TOGETHER:
+        if len(self._tracks) * len(track) * (1 + len(self._pairs[0])) > _BATCH_DISTANCES:
             self._work_out()
 
     def _work_out(self) -> None:

@@ -24,8 +24,8 @@ class Messages(NamedTuple):
 class Punctuality(NamedTuple):
     """Punctuality of the companions of a real-time run.
 
-    ``misses`` of ``deadlines`` had no step that began within 1 ms; lateness (ms) of the steps. It covers the
-    time from boot to landing, without imposed freezes.
+    For ``misses`` of ``deadlines`` no step began within 1 ms. ``p50_ms``, ``p99_ms``, ``max_ms``: lateness of
+    the steps. All cover the time from boot to landing, without imposed freezes.
     """
 
     misses: int

@@ -16,8 +16,8 @@ from outrider.runs.steps_file import StepsFile
 class Recorder:
     """Observer that writes one tlog in ``directory`` for each vehicle of ``systems``.
 
-    The tlog holds all that the vehicle's companion received and sent, at the times at which it handled it. A
-    second file holds the times of its steps. ``files`` closes the files.
+    The tlog holds all datagrams that the vehicle's companion received and sent, with the times at which it
+    handled them. A second file holds the times of its steps. ``files`` closes the files.
     """
 
     def __init__(self, directory: Path, systems: Iterable[int], files: ExitStack) -> None:

@@ -1,7 +1,7 @@
 """``vehicle-N.steps.npz`` of a run directory: the step times of the companion.
 
-The tlog holds what the companion received and sent at these times. With both, its flight can be replayed bit
-for bit.
+The tlog holds what the companion received and sent at these times. With the two files the companion's flight
+can be replayed bit for bit.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from outrider.runs.array_file import read_arrays
 class StepsFile:
     """Collector of step times (µs), which writes them to ``path`` when it is closed.
 
-    Steps usually follow at the same gap. Each gap is stored once, with the number of its successive
-    repetitions, so that a day takes next to no memory.
+    Steps usually follow at equal gaps. In memory each run of equal gaps is one gap and its length (at least
+    1), so a day takes next to no memory.
     """
 
     def __init__(self, path: Path) -> None:
@@ -53,6 +53,6 @@ def read_steps(path: Path) -> NDArray[np.int64]:
     arrays = read_arrays(path, {"first": ("F",), "gaps": ("n",)})
     steps = np.concatenate([arrays["first"], arrays["gaps"]])
     if steps.dtype != np.int64:
-        raise InputError(Fault(str(path), "does not hold times"))
+        raise InputError(Fault(str(path), "holds times that are not int64"))
     times: NDArray[np.int64] = np.cumsum(steps)
     return times

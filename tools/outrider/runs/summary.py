@@ -31,8 +31,8 @@ class Cost(NamedTuple):
 def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Value]:
     """Return the summary of a finished flight.
 
-    Errors, speeds and counters cover the time of the clock; separation, solver failures and relaxed QPs count
-    from the start of the flight. Values that a lock-step flight with the field does not have are null.
+    Errors, speeds and plan counters cover the time from the clock's start to its end; separation, messages,
+    solver failures and relaxed QPs cover the whole flight. Values that do not apply are null.
     """
     scenario, truth = flight.scenario, flight.truth
     config = scenario.companion

@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write ``content`` (text as UTF-8) to ``path`` atomically, replacing what is there.
+    """Write ``content`` (text as UTF-8) to ``path`` atomically; replace an existing file.
 
-    Raises OSError if that fails; then nothing has changed.
+    Raises OSError if that fails; then ``path`` is unchanged.
     """
     new = path.with_name(f".{path.name}.{os.getpid()}")
     try:

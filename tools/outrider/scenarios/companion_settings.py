@@ -10,8 +10,8 @@ from sitl.estimation.profiles import PROFILES
 def settings_of(scenario: Scenario) -> CompanionConfig:
     """Return the companions' settings, completed from the scenario.
 
-    They include the scenario's obstacles; in the field, the position error of the sensor profile, unless the
-    settings have a larger one; and, with certified avoidance, the fleet whose plans are waited for.
+    They include the scenario's obstacles; ``field.position_sigma``, at least that of the sensor profile; and,
+    with certified avoidance, the ids of the vehicles as ``certified.fleet`` unless it is given.
     """
     companion, profile = scenario.companion, PROFILES[scenario.sensors]
     known = (*companion.obstacles, *scenario.obstacles)

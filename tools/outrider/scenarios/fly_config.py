@@ -56,11 +56,15 @@ class FlyConfig(Settings):
     )
     clock: Literal["auto", "autopilot", "wall"] = Field(
         "auto",
-        description="whose time it lives by: autopilot for a simulation, which may run ten times as fast; "
-        "wall for a real one; auto: found out before the go, a simulation by its rate",
+        description="clock of the companion: autopilot for a simulation, which may run ten times as fast; "
+        "wall for a real vehicle; auto: detected before the go from the rate of the autopilot's time",
     )
     period_us: int = Field(
-        10_000, ge=1_000, le=100_000, multiple_of=4, description="of its steps, µs of that clock"
+        10_000,
+        ge=1_000,
+        le=100_000,
+        multiple_of=4,
+        description="between the companion's steps, µs of that clock",
     )
     companion: CompanionConfig = CompanionConfig()
 

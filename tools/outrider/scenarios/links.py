@@ -49,7 +49,7 @@ class Links(Part):
     reordering: Share = 0.0
     burst: Burst = Field(0.0, description="mean number of messages lost in a row; 0: each on its own")
     directions: tuple[Direction, ...] = Field(
-        (), max_length=64, description="where it differs; the last that fits counts"
+        (), max_length=64, description="exceptions by direction; for each value, the last match counts"
     )
 
     @model_validator(mode="after")

@@ -17,10 +17,10 @@ class _Moving(Part):
     """Obstacle that follows a smooth closed path from the goal event on and does not give way."""
 
     radius: Length = Field(description="m")
-    speed: float = Field(gt=0.0, le=20.0, description="m/s, once it has set out")
+    speed: float = Field(gt=0.0, le=20.0, description="m/s, after the acceleration")
     setting_out: float = Field(1.0, gt=0.0, le=10.0, description="m/s², until it has its speed")
-    rate_hz: float = Field(10.0, gt=0.0, le=50.0, description="how often it says where it is")
-    shares_plan: bool = Field(False, description="whether it also says where it will be in the next 1.6 s")
+    rate_hz: float = Field(10.0, gt=0.0, le=50.0, description="rate of its position messages")
+    shares_plan: bool = Field(False, description="whether it also sends its trajectory of the next 1.6 s")
 
 
 class MovingSpherePart(_Moving):

@@ -17,9 +17,9 @@ from outrider.yaml_files.schema_nodes import Schema
 AVOIDANCES = get_args(Avoidance)
 METHODS = get_args(MethodName)
 FLAVOURS = get_args(FlavourName)
-_SLOWEST_PLAN = 10_000_000
+_MAX_REPLAN_US = 10_000_000
 """µs"""
-_FASTEST_AIR = 50.0
+_MAX_WIND_M_S = 50.0
 """m/s"""
 
 
@@ -93,7 +93,7 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
 
 
 def _fault(error: ErrorDetails, options: Options) -> str:
-    """Return the fault of an option in its own words; all options if a rule between several is broken."""
+    """Return the error as text about its option; about all given options if they are inconsistent."""
     if error["type"] == "value_error":
         given = [
             f"{_option(name)} {value}"
@@ -122,14 +122,17 @@ def _vehicles(count: int, scenario: Scenario) -> int:
 
 
 def _replan_us(rate: float, scenario: Scenario) -> int:
-    """Return the period (µs) of ``rate`` plans per second; raise InputError if it fits no tick."""
+    """Return the period (µs) of ``rate`` plans per second.
+
+    Raises InputError if it is out of bounds or not a whole number of ticks.
+    """
     tick, least = scenario.timing.base_tick_us, scenario.timing.companion_us
-    if not 1e6 / _SLOWEST_PLAN <= rate <= 1000.0:
-        raise InputError(f"--replan-hz {rate:g}: allowed: {1e6 / _SLOWEST_PLAN:g} to {1e6 / least:g}")
+    if not 1e6 / _MAX_REPLAN_US <= rate <= 1000.0:
+        raise InputError(f"--replan-hz {rate:g}: allowed: {1e6 / _MAX_REPLAN_US:g} to {1e6 / least:g}")
     period = round(1e6 / rate)
     if period % tick == 0 and period >= least:
         return period
-    near = [max(period // tick * tick, least), min(max(period // tick * tick + tick, least), _SLOWEST_PLAN)]
+    near = [max(period // tick * tick, least), min(max(period // tick * tick + tick, least), _MAX_REPLAN_US)]
     best = min(near, key=lambda one: abs(1e6 / one - rate))
     raise InputError(
         f"--replan-hz {rate:g}: a plan's period is a whole number of ticks of {tick} µs, and {least} µs or "
@@ -152,10 +155,10 @@ def wind_of(text: str) -> list[float]:
         parts = [float(word) for word in text.split(",")]
     except ValueError:
         parts = []
-    if not 1 <= len(parts) <= 3 or not all(isfinite(part) and abs(part) <= _FASTEST_AIR for part in parts):
+    if not 1 <= len(parts) <= 3 or not all(isfinite(part) and abs(part) <= _MAX_WIND_M_S for part in parts):
         raise InputError(
             f"--wind {text}: allowed is a speed in m/s (towards east), or EAST,NORTH or EAST,NORTH,UP, each "
-            f"from -{_FASTEST_AIR:g} to {_FASTEST_AIR:g}"
+            f"from -{_MAX_WIND_M_S:g} to {_MAX_WIND_M_S:g}"
         )
     return parts + [0.0] * (3 - len(parts))
 

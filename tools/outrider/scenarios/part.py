@@ -20,7 +20,7 @@ System = Annotated[int, Field(ge=1, le=255)]
 FIRST_SYSTEM = 11
 """System id of the first vehicle of a fleet; a recorded target keeps its own."""
 TARGET_SYSTEM = 10
-"""System id of a target that is not recorded: below the fleet, so that no vehicle can have it."""
+"""System id of a target that is not recorded: below those of the fleet, so that no vehicle has it."""
 
 FIRST_MOVING = 190
 """System id of the first moving obstacle."""

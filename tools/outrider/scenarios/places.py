@@ -34,7 +34,9 @@ class Ring(Part):
         5.0, ge=0.5, le=100.0, description="m above ground, where the vehicles hover at first"
     )
     jitter: float = Field(0.0, ge=0.0, le=2.0, description="m, radius of the ball around each start")
-    first_deg: float = Field(0.0, ge=-360.0, le=360.0, description="bearing of the first vehicle, ENU")
+    first_deg: float = Field(
+        0.0, ge=-360.0, le=360.0, description="first vehicle's angle from east towards north"
+    )
 
     def radius_of(self, count: int) -> float:
         """Return the radius (m) with ``count`` vehicles.

@@ -42,12 +42,12 @@ __all__ = [
 ]
 
 
-_MOST_SYSTEMS = 244
+_MAX_VEHICLES = 244
 """System ids from 11 to 254; 255 is the operator's."""
 
 
 class Timing(Part):
-    """Periods, µs; all are whole numbers of the base tick."""
+    """Periods, µs; all are whole multiples of the base tick."""
 
     base_tick_us: Period = 2_500
     autopilot_us: Period = Field(
@@ -77,10 +77,10 @@ class Scenario(Part):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     description: str = ""
     task: Literal["escort", "antipodal", "goto"]
-    vehicles: int = Field(ge=1, le=244, description="how many fly the task; bystanders are more")
+    vehicles: int = Field(ge=1, le=244, description="number with the task, without bystanders")
     vehicle: str = Field("firefly", description="file in config/vehicles")
     flavour: FlavourName | tuple[FlavourName, ...] = Field(
-        "ardupilot", description="firmware of all vehicles, or a list that is gone through again and again"
+        "ardupilot", description="firmware of all vehicles, or a list that is assigned to them in turn"
     )
     autopilot: AutopilotPart = AutopilotPart()
     origin: Origin = Origin()
@@ -187,8 +187,8 @@ class Scenario(Part):
     def _place_faults(self) -> Iterator[str]:
         if not self.flavour:
             yield "flavour is an empty list; allowed: ardupilot, px4, or a list of them"
-        if self.size > _MOST_SYSTEMS:
-            yield f"vehicles and bystanders are {self.size}; at most {_MOST_SYSTEMS} are allowed"
+        if self.size > _MAX_VEHICLES:
+            yield f"vehicles and bystanders are {self.size}; at most {_MAX_VEHICLES} are allowed"
         if self.task == "antipodal" and not isinstance(self.starts, Ring):
             yield "task 'antipodal' needs starts of kind 'ring'"
         if isinstance(self.starts, Points) and self.vehicles != len(self.starts.at):

@@ -27,10 +27,10 @@ class Starts(NamedTuple):
 
 
 def starts(scenario: Scenario, seed: int, planar: bool) -> Starts:
-    """Return each place, moved within a ball of ``jitter`` (a disc if ``planar``) by ``seed`` alone.
+    """Return the starts, moved at random within a ball of ``jitter`` (a disc if ``planar``), and the goals.
 
-    On a ring the places are even, and in an antipodal swap the goal is the opposite point of the ring, not of
-    the jittered start.
+    On a ring the places before jitter are evenly spaced. In an antipodal swap the goal is the point opposite
+    to the place before jitter. The result depends on ``scenario``, ``seed`` and ``planar`` alone.
     """
     config, count = scenario.starts, scenario.vehicles
     slots, goals = _slots(scenario)

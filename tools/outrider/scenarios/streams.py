@@ -1,8 +1,8 @@
 """Streams of random numbers of a seed: one table, so that no two uses draw the same numbers.
 
-A stream is numpy's default generator of the words seed, tag, and more if there are several of a kind. numpy
-fills missing words with zeros, so a tag is never 0: that would be the stream of the bare seed, which the
-jitter of the starts has. ``sitl`` has a vehicle's system id, 10 or more, in the place of the tag.
+A stream is numpy's default generator seeded with the words seed, tag and number. numpy pads missing words
+with zeros, so the tag 0, of the starts' jitter, gives the stream of the bare seed; every other tag is larger.
+``sitl`` uses a vehicle's system id, 10 or more, in the place of the tag.
 """
 
 from __future__ import annotations

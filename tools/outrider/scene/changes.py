@@ -28,7 +28,7 @@ class Orders:
         self._last = ViewCommands()
 
     def new(self, commands: ViewCommands, seconds: float | None) -> Change | None:
-        """Return what is new in ``wishes``, and record it; None if nothing is."""
+        """Return the values of ``commands`` that are new, and record them; None if there are none."""
         last, self._last = self._last, commands
         change = Change(
             commands.methods if commands.methods != last.methods else None,

@@ -6,7 +6,7 @@ import socket
 
 ROOM = 1 << 20
 """Bytes that may be under way; the system may allow less."""
-_LARGEST = 1 << 20
+_MAX_DATAGRAM_BYTES = 1 << 20
 
 
 class DatagramChannel:
@@ -41,7 +41,7 @@ class DatagramChannel:
         found = []
         try:
             while True:
-                found.append(self._end.recv(_LARGEST))
+                found.append(self._end.recv(_MAX_DATAGRAM_BYTES))
         except OSError:
             return found
 

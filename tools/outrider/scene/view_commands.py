@@ -1,7 +1,6 @@
 """Commands of the view's user to a simulation.
 
-All commands are sent again and again: a lost message is repeated, and a command that is no longer sent no
-longer applies.
+Each message holds all present commands and is repeated, so that the loss of a message has no lasting effect.
 """
 
 from __future__ import annotations
@@ -14,13 +13,13 @@ from companion.config.planning import MethodName
 from outrider.scenarios.options import METHODS
 
 FASTEST = 100.0
-"""Largest speed as a multiple of real time; beyond it, a flight just runs as fast as it can."""
+"""Largest speed that can be commanded, as a multiple of real time."""
 LOSSY = ("swarm", "target")
 """Links on which the commanded loss applies, as with ``--loss``."""
-_FAR = 10_000.0
+_MAX_COORDINATE_M = 10_000.0
 """m"""
-_MOST = 1 << 31
-_LARGEST = 4096
+_MAX_COUNT = 1 << 31
+_MAX_BYTES = 4096
 """Bytes."""
 
 
@@ -48,13 +47,13 @@ class ViewCommands(NamedTuple):
 
 
 def encoded(commands: ViewCommands) -> bytes:
-    """Encode ``wishes`` for ``decoded``."""
+    """Encode ``commands`` for ``decoded``."""
     return json.dumps(commands._asdict()).encode()
 
 
 def decoded(data: bytes) -> ViewCommands | None:
     """Decode the result of ``encoded``; return None for anything else."""
-    if len(data) > _LARGEST:
+    if len(data) > _MAX_BYTES:
         return None
     try:
         found = json.loads(data)
@@ -70,10 +69,13 @@ def _sensible(commands: ViewCommands) -> bool:
     return (
         (speed is None or (_number(speed) and 0.0 < speed <= FASTEST))
         and isinstance(commands.paused, bool)
-        and all(type(count) is int and 0 <= count < _MOST for count in (commands.steps, commands.moves))
+        and all(type(count) is int and 0 <= count < _MAX_COUNT for count in (commands.steps, commands.moves))
         and (methods is None or (isinstance(methods, str) and set(methods.split("+")) <= set(METHODS)))
         and (loss is None or (_number(loss) and 0.0 <= loss <= 1.0))
-        and (target is None or (len(target) == 3 and all(_number(x) and abs(x) < _FAR for x in target)))
+        and (
+            target is None
+            or (len(target) == 3 and all(_number(x) and abs(x) < _MAX_COORDINATE_M for x in target))
+        )
     )
 
 

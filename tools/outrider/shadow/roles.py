@@ -20,7 +20,7 @@ from mavlink_bridge.wire.header import header
 from outrider.errors import Fault, InputError
 from outrider.logs.timeline import on_one_line
 
-_FAR = 5000.0
+_MAX_PLAUSIBLE_M = 5000.0
 _SURVEYED = {
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
@@ -35,7 +35,7 @@ class Part(Enum):
     SWARM = "swarm"
     TARGET = "target"
     SENT = "sent"
-    """A set-point for the own vehicle, from any sender."""
+    """A set-point, except from the own autopilot; its addressee is not checked here."""
     NOTHING = ""
 
 
@@ -65,10 +65,12 @@ class Roles:
 class OwnRecords(NamedTuple):
     """Result of a first pass over the own vehicle's records.
 
-    ``place``: its first position (°, °, m above mean sea level); ``above_home``: the height of that above its
-    home; ``origin``: its GPS_GLOBAL_ORIGIN; ``local``: whether it sends LOCAL_POSITION_NED. ``systems`` are
-    all senders, ``placed`` those that report their position; ``begin`` and ``end`` of the log, µs; ``reach``:
-    its largest horizontal distance (m) from its first position, of those within 5 km.
+    ``place``: its first position with a fix (°, °, m above mean sea level), or without any fix its first
+    position, at 0°, 0°; ``above_home``: height (m) of ``place`` above home; ``origin``: its first
+    GPS_GLOBAL_ORIGIN, or the origin computed from one position in both frames; ``local``: whether it sends
+    LOCAL_POSITION_NED. ``systems`` are all senders, ``placed`` those that report their position; ``begin``
+    and ``end`` of the log, µs; ``reach``: its largest horizontal distance (m) from ``place``, of those within
+    5 km.
     """
 
     place: tuple[float, float, float]
@@ -88,7 +90,7 @@ class OwnRecords(NamedTuple):
 
     @property
     def fleet(self) -> FleetFrame:
-        """Fleet frame at the foot of the vehicle's first position."""
+        """Fleet frame with its origin below (or above) the vehicle's first position, at home's altitude."""
         latitude, longitude, altitude = self.place
         return FleetFrame(latitude, longitude, altitude - self.above_home)
 
@@ -165,7 +167,7 @@ def _apart(here: FleetFrame, place: GlobalPosition) -> float:
     """Return the horizontal distance, m; 0 if it is implausibly large."""
     east, north, _ = here.to_enu(place.latitude, place.longitude, place.altitude)
     far = float(np.hypot(east, north))
-    return far if far < _FAR else 0.0
+    return far if far < _MAX_PLAUSIBLE_M else 0.0
 
 
 def _origin(place: GlobalPosition, local: LocalPosition) -> tuple[float, float, float]:

@@ -49,8 +49,8 @@ class Course(NamedTuple):
 class Facts(NamedTuple):
     """Properties of a sequence of set-points; None where there is nothing to measure.
 
-    ``finite``: whether all values that are not ignored are finite; ``max_step_m``: between two that follow
-    each other within 0.1 s; ``gaps``: number of longer intervals.
+    ``finite``: whether all values that are not ignored are finite; ``max_step_m``: largest distance between
+    successive positions within 0.1 s; ``gaps``: number of longer intervals.
     """
 
     setpoints: int
@@ -112,8 +112,8 @@ def steps(of: Course) -> Array:
 def apart(would: Course, sent: Course) -> Array:
     """Return the distances (k,) m between the set-points of ``sent`` and ``would``.
 
-    Each set-point of ``sent`` is compared with the newest of ``would`` at its time, where both have a
-    position.
+    Each set-point of ``sent`` is compared with the newest of ``would`` at its time, if that is at most 0.1 s
+    old and both have a position; all others are left out.
     """
     if not len(would.times) or not len(sent.times):
         return np.zeros(0)

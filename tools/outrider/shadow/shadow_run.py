@@ -32,7 +32,7 @@ from outrider.simulation.beacon import Beacon
 from outrider.simulation.paths import Motion
 from outrider.supervision.supervised_node import SupervisedNode
 
-_NEVER = 1 << 60
+_INVALID_TIME_US = 1 << 60
 """µs, 36,000 years after 1970: damage."""
 STEP = 10_000
 """µs"""
@@ -47,7 +47,8 @@ class ShadowRun:
 
     ``would``: set-points that the companion would have sent; ``sent``: those that were, each with its time
     (µs of the log); ``places``: (time, position (3,)) NED of the vehicle itself, local as the set-points are.
-    ``reasons``: steps of 10 ms without a set-point, by what was missing; ``holds``: plans that were held.
+    ``reasons``: number of 10 ms steps without a set-point, by the missing input; ``holds``: number of held
+    plans; ``records``: number of records read.
     """
 
     would: list[Sent] = field(default_factory=list)
@@ -69,13 +70,13 @@ def shadow_flight(
 ) -> ShadowRun:
     """Step a shadow companion every 10 ms of the log's time with the records up to then.
 
-    Without a target in ``cast``, a fixed target stands at the own vehicle's first position. ``on_step`` is
-    called with the time (µs) and the number of records read. The ``fleet`` frame is the log's own unless one
-    is given.
+    Without a target in ``cast``, a fixed target is below the own vehicle's first position, at height 0 of the
+    ``fleet`` frame, which is the log's own unless one is given. ``on_step`` is called with the time (µs) and
+    the number of records read.
 
     With ``follow`` the companion uses the vehicle's clock, as ``outrider fly`` does. Otherwise the data of a
-    vehicle whose clock is a hundredth slower than the recorder's would appear ever older, and the plans would
-    begin ever further ahead of it.
+    vehicle whose clock is 1 % slower than the recorder's would appear ever older, and the plans would begin
+    ever further ahead of the vehicle.
     """
     fleet = seen.fleet if fleet is None else fleet
     system = next(n for n in (TARGET_SYSTEM, 1, 2, 3) if n not in seen.systems and n != cast.own)
@@ -106,14 +107,14 @@ def shadow_flight(
 
 
 def steps(records: Iterable[Record]) -> Iterator[tuple[int, list[Record]]]:
-    """Yield times (µs, multiples of 4) every 10 ms, each with the records since the last one.
+    """Yield times (µs, multiples of 4) every 10 ms, each with the records since the previous one.
 
-    The records are on one time line (see ``timeline``). Long silences are skipped, and so are records with a
-    time that no clock shows.
+    The records are on one time line (see ``timeline``). Silences of more than 5 s are skipped, and so are
+    records with an impossible time.
     """
     now: int | None = None
     batch: list[Record] = []
-    for record in on_one_line(one for one in records if one.time < _NEVER):
+    for record in on_one_line(one for one in records if one.time < _INVALID_TIME_US):
         if now is None:
             now = record.time
         if record.time > now + IDLE:
@@ -133,7 +134,7 @@ def _given(
 ) -> list[Datagram]:
     """Return the datagrams that the companion receives for a record.
 
-    Set-points from other senders and the vehicle's positions are collected in ``found``.
+    Set-points for the own vehicle and its local positions are collected in ``found``.
     """
     if part is Part.NOTHING:
         return []

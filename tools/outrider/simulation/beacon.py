@@ -1,4 +1,4 @@
-"""Beacon that sends GLOBAL_POSITION_INT of one sender, at its rate, on one link."""
+"""Beacon: sender of GLOBAL_POSITION_INT of one system at a fixed rate on one link."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Beacon:
         self._codec = Codec()
 
     def hasten(self, now: int) -> None:
-        """Make the next message due at ``now``, and count the period from then."""
+        """Make the next message due at ``now``; the later ones follow by the period."""
         self._next = now
 
     def due(self, now: int) -> bool:

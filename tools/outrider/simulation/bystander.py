@@ -1,4 +1,4 @@
-"""Bystander: a vehicle outside the ring that reports its position, shares no plan and ignores the others."""
+"""Bystander: a vehicle outside the ring that reports its position and ignores all other vehicles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DEAF_TO = "swarm"
 class Bystander(Companion):
     """Companion that receives nothing on the swarm link.
 
-    It hovers or flies through, and does not give way.
+    It hovers or flies to its goal, and does not give way. Its settings let it share no plan.
     """
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:

@@ -1,6 +1,6 @@
-"""Conductor of a flight from take-off to landing, by the observed state.
+"""Conductor of a flight from take-off to landing, according to the observed state.
 
-Its stages: take off, give the goal, wait for convergence or the cap, land.
+Its steps: take off, send the goals, wait for convergence or the time limit, land.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from sitl.estimation.profiles import PROFILES
 NEAR, SLOW, HOLD = 0.3, 0.3, 1_000_000
 """Limits of convergence: distance (m), speed relative to the target (m/s), duration (µs)."""
 _SIGMAS = 2.0
-"""The convergence distance is at least this many σ of the sensors' error.
+"""Minimum convergence distance in σ of the sensors' position error.
 
-With ``truth`` and ``rtk`` that is less than ``NEAR``.
+With the profiles ``truth`` and ``rtk`` it is less than ``NEAR``.
 """
 HOVERING = 0.1
-"""m/s; the clock starts when every vehicle is slower. With noisy sensors a hover is less steady."""
-_RESTLESS = {"truth": HOVERING, "rtk": 0.2, "gnss": 0.4, "sih": 0.4}
-_TOSSED = 0.8
+"""Maximum speed of a hover (m/s), with exact sensors; the clock starts when every vehicle hovers."""
+_MAX_HOVER_SPEED_M_S = {"truth": HOVERING, "rtk": 0.2, "gnss": 0.4, "sih": 0.4}
+_MAX_HOVER_SPEED_IN_TURBULENCE_M_S = 0.8
 """The same limit in turbulent air (m/s)."""
 PREPARE_CAP = 90_000_000
 """µs within which all vehicles must hover; otherwise the flight fails."""
-_SETTLE, _AFTER = 500_000, 5_000_000
+_HOVER_TIME_US, _TIME_AFTER_CONVERGENCE_US = 500_000, 5_000_000
 _LAND_CAPS = {"land": 60_000_000, "return": 120_000_000}
 
 
@@ -48,9 +48,9 @@ class Stage(Enum):
 class Observation(NamedTuple):
     """Observed state at ``now`` (µs).
 
-    True positions and velocities (K, 3), the target's position or None, ENU; ``ready``: whether all
-    companions that can be under way are; ``waiting``: the conditions for which the others wait; ``armed``:
-    whether any motor may turn.
+    True positions and velocities (K, 3), and the target's position (3,) or None: ENU. ``ready``: whether all
+    companions are in phase ESCORT (in real time: all that have not ended). ``waiting``: the conditions for
+    which the others wait. ``armed``: whether any vehicle whose companion has not vanished is armed.
     """
 
     now: int
@@ -71,7 +71,7 @@ class _Intruder(NamedTuple):
 
 
 def _intruders(scenario: Scenario) -> list[_Intruder]:
-    """Return the bystanders with a goal, in the order of time."""
+    """Return the bystanders with a goal, sorted by their starting times."""
     found = [
         _Intruder(round(1e6 * other.after_s), system, np.array(other.goal))
         for system, other in zip(scenario.systems[scenario.vehicles :], scenario.bystanders, strict=True)
@@ -81,7 +81,7 @@ def _intruders(scenario: Scenario) -> list[_Intruder]:
 
 
 def _turning_speed(scenario: Scenario) -> float:
-    """Return the speed (m/s) of the outermost vehicle of a ring that turns; 0 if it does not turn."""
+    """Return the largest speed (m/s) of a vehicle due to the ring's rotation; 0 if the ring does not turn."""
     companion = scenario.companion
     if not companion.turn_rate:
         return 0.0
@@ -93,7 +93,8 @@ def _turning_speed(scenario: Scenario) -> float:
 class Conductor:
     """Sequence of the stages of one flight.
 
-    ``failure`` states the reason if the flight never reached its clock or did not land.
+    ``failure``: the reason if the clock never started, the flight was aborted, or a vehicle did not land in
+    time.
     """
 
     def __init__(self, scenario: Scenario, starts: Starts, operator: Operator, epoch: int) -> None:
@@ -137,7 +138,7 @@ class Conductor:
         return self.stage is Stage.DONE
 
     def abort(self, now: int, why: str) -> None:
-        """Order the landing now, unless the flight is landing already, and record ``why`` as the failure."""
+        """Order the landing and record ``why`` as the failure, unless the landing has begun already."""
         if self.stage in (Stage.PREPARE, Stage.CLOCK):
             self.failure = why
             if self.clock_start is not None:
@@ -145,9 +146,9 @@ class Conductor:
             self._land(now)
 
     def errors(self, sight: Observation) -> Array:
-        """Return the distance (vehicles,) in m of each vehicle with the task from its place.
+        """Return the distance (vehicles,), m, of each vehicle from its place, without bystanders.
 
-        The place is its goal, or its surface around the target. The distances are NaN without a target.
+        The place is its goal or, without goals, its surface around the target; NaN if the target is absent.
         """
         positions = sight.positions[: self._scenario.vehicles]
         if self._starts.goals is not None:
@@ -157,10 +158,10 @@ class Conductor:
         return standoff(self._scenario, positions, sight.target)
 
     def _prepare(self, sight: Observation) -> None:
-        now, still = sight.now, _RESTLESS[self._scenario.sensors]
+        now, still = sight.now, _MAX_HOVER_SPEED_M_S[self._scenario.sensors]
         if self._scenario.weather.w20 > 0.0:
-            still = _TOSSED
-        # A ring that turns is never at rest.
+            still = _MAX_HOVER_SPEED_IN_TURBULENCE_M_S
+        # The vehicles of a ring that turns are never at rest.
         still += self._turning
         calm = sight.ready and float(np.linalg.norm(sight.velocities, axis=1).max()) < still
         if not calm:
@@ -170,7 +171,7 @@ class Conductor:
                 self._land(now)
             return
         self._calm_since = now if self._calm_since is None else self._calm_since
-        if now - self._calm_since < _SETTLE:
+        if now - self._calm_since < _HOVER_TIME_US:
             return
         self.stage, self.clock_start = Stage.CLOCK, now
         if self._starts.goals is not None:
@@ -194,7 +195,7 @@ class Conductor:
                 self._near_since = None
         over = since >= self._scenario.duration_s * 1e6
         if self.converged_at is not None:
-            over = now >= self.converged_at + HOLD + _AFTER
+            over = now >= self.converged_at + HOLD + _TIME_AFTER_CONVERGENCE_US
         if over:
             self.clock_end = now
             if self._scenario.airborne:

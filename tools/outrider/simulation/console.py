@@ -50,9 +50,9 @@ _WORDS = {
 
 @contextmanager
 def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
-    """Show a bar for one flight, or a line now and then when there is no terminal.
+    """Show a progress bar of one flight; without a terminal, a line now and then.
 
-    The yielded function takes stage and simulated seconds. No thread is used, because a flight in real time
+    Yields a function that takes stage and simulated seconds. No thread is used, because a flight in real time
     forks while the bar is shown.
     """
     columns = (

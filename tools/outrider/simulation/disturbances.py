@@ -52,7 +52,7 @@ class Computers(Protocol):
 
 
 def events(scenario: Scenario) -> list[Event]:
-    """Return all events of a scenario in the order of time; an end goes before a beginning at one instant."""
+    """Return all events of a scenario, sorted by time; of simultaneous events the ends come first."""
     found = []
     # A clock fault holds from the start, so it is no event.
     sudden = [fault for fault in scenario.faults if not isinstance(fault, ClockFault)]
@@ -66,7 +66,7 @@ def events(scenario: Scenario) -> list[Event]:
 
 
 def strike_autopilot(event: Event, autopilot: Autopilot) -> None:
-    """Apply an event to its vehicle's autopilot; an event of the companion has no effect here."""
+    """Apply an event to ``autopilot``, that of the event's vehicle; events of companions have no effect."""
     match event.what:
         case GpsLoss():
             if event.over:
@@ -76,14 +76,14 @@ def strike_autopilot(event: Event, autopilot: Autopilot) -> None:
         case GpsJump(offset=offset):
             autopilot.shift_gps((0.0, 0.0, 0.0) if event.over else offset)
         case MotorFailure(rotor=rotor, left=left):
-            # Thrust is proportional to the square of the speed, which is what fails.
+            # ``left`` is the share of thrust; ``fail_rotor`` takes the share of speed; thrust ~ speed².
             autopilot.fail_rotor(rotor, sqrt(left))
         case _:
             pass
 
 
 def strike_computer(event: Event, computers: Computers) -> None:
-    """Apply an event to a companion's computer or radio; an event of an autopilot has no effect here."""
+    """Apply an event to a companion's computer or radio; events of autopilots have no effect."""
     match event.what:
         case Freeze(vehicle=system):
             if event.over:

@@ -1,6 +1,6 @@
 """Nodes of a scenario for one seed, and their links.
 
-This is the only module that composes companion and sitl; they still meet only in MAVLink bytes.
+Only this module constructs both companions and emulated autopilots; they exchange only MAVLink bytes.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from sitl.vehicle.config import VehicleConfig
 
 
 class End(NamedTuple):
-    """A node on a link: its name, the link's name there, and the words by which a scenario refers to it."""
+    """A node on a link: its name, its name of the link, and the words that denote it in a scenario."""
 
     node: str
     link: str
@@ -67,7 +67,7 @@ class Fleet:
     def companion_config_of(self, k: int) -> CompanionConfig:
         """Return the settings of vehicle ``k``.
 
-        A bystander flies to goals, shares no plan and is configured with no obstacles.
+        A bystander flies to goals, shares no plan, and avoids neither the target nor obstacles.
         """
         config = self.companion_config
         if k < self.scenario.vehicles:
@@ -114,7 +114,7 @@ class Fleet:
 
     @property
     def with_backup(self) -> list[int]:
-        """Indices of the vehicles with a backup node: those on whose plans others rely."""
+        """Indices of the vehicles with a backup node: with certified avoidance all but the bystanders."""
         certified = self.scenario.companion.avoidance == "certified"
         return list(range(self.scenario.vehicles)) if certified else []
 
@@ -154,7 +154,7 @@ class Fleet:
     def phases(self) -> list[int]:
         """Return the phase (µs) of each companion in its period.
 
-        The phases are drawn by seed, so that the companions never all replan on one tick.
+        The phases are drawn by seed, so that the companions do not all replan on the same tick.
         """
         timing = self.scenario.timing
         random = stream(self.seed, Stream.PHASES)
@@ -178,7 +178,7 @@ class Fleet:
                     ends_here.append(End(names.backup_node(system), link, words))
                 channels.append(_channel(f"{link}-{name}", ends_here, getattr(links, link)))
             if k in self.with_backup:
-                # On the same computer nothing is lost.
+                # Both run on the same computer, so nothing is lost.
                 channels.append(
                     Channel(f"helm-{name}", {name: "swarm", names.backup_node(system): "swarm"}, Faults())
                 )

@@ -1,6 +1,6 @@
 """Lock-step flight of a scenario: its fleet under simulated time.
 
-The conductor leads the flight, the witness observes it, and the scenario's faults are applied to it.
+The conductor leads the flight, the truth observer records it, and the scenario's events are applied to it.
 """
 
 from __future__ import annotations
@@ -32,20 +32,21 @@ from outrider.simulation.truth_observer import TruthObserver
 from sitl.vehicle.config import VehicleConfig
 
 EPOCH = 1_767_225_600_000_000
-"""Unix µs at which every simulated flight begins (2026-01-01 00:00 UTC): logs then open in any tool."""
-_LONGEST = 10_000_000_000
-"""µs; the conductor ends every flight long before."""
+"""Unix time (µs) of the beginning of every simulated flight: 2026-01-01 UTC, a date that log tools accept."""
+_MAX_DURATION_US = 10_000_000_000
+"""Upper bound of a flight (µs); the conductor ends every flight long before."""
 
 Progress = Callable[[Stage, float], None]
 Onlooker = Callable[["Flight", int], None]
-"""Function that is called at every sample (µs), after all nodes have stepped."""
+"""Function of flight and time (µs), called at every sample after all nodes have stepped."""
 
 
 class Flight:
     """Flight of a scenario's nodes for one seed.
 
-    ``progress`` is called with the stage and simulated seconds. With a ``run_directory`` each vehicle's tlog
-    is written there. ``stopwatch`` (ns) measures planning; the ``onlooker`` may change public attributes.
+    ``progress`` is called with the stage and simulated seconds. Each vehicle's tlog is written to the
+    ``run_directory``, if there is one. ``stopwatch`` (ns) measures planning. ``reverse_nodes`` reverses the
+    order in which nodes step. The ``onlooker`` may change the nodes and the network.
     """
 
     def __init__(
@@ -90,7 +91,7 @@ class Flight:
                 taps.append(Recorder(self._directory, self.systems, files))
             loop = LockStep(self._schedule(), self.network, self.scenario.timing.base_tick_us, taps)
             computers = _Computers(loop, self.network)
-            loop.run(EPOCH + _LONGEST, lambda now: self._watch(now, computers))
+            loop.run(EPOCH + _MAX_DURATION_US, lambda now: self._watch(now, computers))
 
     @property
     def outcome(self) -> Outcome:
@@ -114,7 +115,7 @@ class Flight:
         )
 
     def _schedule(self) -> list[Scheduled]:
-        """Return the schedule; companions are due out of step, and by clocks of their own."""
+        """Return the schedule; each companion has its own phase and clock."""
         timing = self.scenario.timing
         nodes = [Scheduled(a, timing.autopilot_us, EPOCH) for a in self.autopilots]
         for k, (companion, phase) in enumerate(zip(self.companions, self.fleet.phases(), strict=True)):
@@ -148,7 +149,7 @@ class Flight:
         return over
 
     def _begin(self, now: int) -> None:
-        """Start the clock: the goal event."""
+        """Process the goal event: record the tallies, start target, moving obstacles and autopilots."""
         self._tally_at_start = [c.tally for c in self.companions]
         self.target.begin(now)
         for moving in self.moving:
@@ -200,7 +201,7 @@ class _Computers:
 
 
 def truth_of(scenario: Scenario) -> GroundTruth:
-    """Return the collector of the scenario's true motions, with its limits of distance."""
+    """Return the collector of the true motions, with the scenario's distance limits and obstacles."""
     return GroundTruth(
         scenario.size,
         Limits(scenario.d_min, scenario.d_min_target, scenario.d_min_obstacle),

@@ -22,7 +22,7 @@ from outrider.simulation.paths import Array, ClosedPath, Motion, Walk
 
 LINK = "swarm"
 STEP = 100_000
-"""µs between the knots of a plan: with all knots of the wire it reaches 1.6 s."""
+"""µs between the knots of a plan."""
 
 
 class MovingObstacle:
@@ -47,7 +47,7 @@ class MovingObstacle:
     def horizon(self, now: int) -> Horizon:
         """Return the trajectory from ``now`` (µs) on.
 
-        It has the velocities of the path at the knots, and deviates from the path by millimetres.
+        Its velocities at the knots are those of the path; its positions deviate from the path by millimetres.
         """
         motions = [self.walk.motion(now + n * STEP) for n in range(KNOTS + 1)]
         accelerations = np.diff([motion.velocity for motion in motions], axis=0) / (1e-6 * STEP)

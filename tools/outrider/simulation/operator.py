@@ -1,4 +1,4 @@
-"""Operator's ground station as a node: it sends the orders to take off, to fly to a goal and to land."""
+"""Operator's ground station as a node: it sends orders to take off, fly to a goal, return and land."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from mavlink_bridge.wire.codec import Codec
 
 LINK = "ground"
 _NAN = float("nan")
-_RETRY = 500_000
+_RETRY_PERIOD_US = 500_000
 
 _Key = tuple[int, int]
 
 
 class Operator:
-    """Ground station that repeats every order each half second until its companion acknowledges it."""
+    """Ground station that repeats every order each half second until the companion accepts it."""
 
     name = "operator"
 
@@ -69,11 +69,11 @@ class Operator:
 
     @property
     def unanswered(self) -> list[int]:
-        """System ids that have not acknowledged an order."""
+        """System ids, sorted, that have not yet accepted an order."""
         return sorted({system for system, _ in self._open})
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Remove acknowledged orders, and send those that are new or overdue."""
+        """Remove accepted orders; send the new ones, and repeat those that are due."""
         self._now = now
         for datagram in inbox:
             for message in self._codec.feed(datagram.data):
@@ -83,7 +83,7 @@ class Operator:
         for key, (order, due) in self._open.items():
             if now >= due:
                 out.append(Datagram(LINK, self._codec.encode(order)))
-                self._open[key] = (order, now + _RETRY)
+                self._open[key] = (order, now + _RETRY_PERIOD_US)
         return out
 
     def _order(self, order: CommandInt | CommandLong) -> None:

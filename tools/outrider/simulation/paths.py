@@ -1,4 +1,4 @@
-"""Smooth closed paths through given places, and motion along one at given speeds."""
+"""Smooth closed paths through given places, and motion along a path at given speeds."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-_FINE = 4096
-"""Number of pieces in which the path is measured."""
-_STILL = 1e-9
-"""m; anything shorter is a place, not a path."""
+_PIECES = 4096
+"""Number of straight pieces by which the length of a path is measured."""
+_MIN_LENGTH_M = 1e-9
+"""m; lower bound of lengths, against division by zero if all places are equal."""
 
 
 class Motion(NamedTuple):
@@ -23,9 +23,9 @@ class Motion(NamedTuple):
 
 
 class ClosedPath:
-    """Trigonometric polynomial through ``places`` (n, 3) at even parameters: smooth everywhere, and closed.
+    """Closed trigonometric polynomial through ``places`` (n, 3), m, at evenly spaced parameters.
 
-    ``length`` in m.
+    ``length``: of one round, m.
     """
 
     def __init__(self, places: Array) -> None:
@@ -33,22 +33,22 @@ class ClosedPath:
         self._harmonics = np.fft.fftfreq(count, 1.0 / count)
         self._coefficients = np.fft.fft(places, axis=0) / count
         if count % 2 == 0:
-            # The highest harmonic of an even number is a cosine; as one complex term it would not be real.
+            # For an even number of places the highest harmonic must be a cosine: its two conjugate terms.
             half = count // 2
             self._harmonics = np.append(self._harmonics, half)
             self._coefficients[half] *= 0.5
             self._coefficients = np.vstack([self._coefficients, np.conj(self._coefficients[half])])
-        self._parameters = np.linspace(0.0, 2.0 * np.pi, _FINE + 1)
+        self._parameters = np.linspace(0.0, 2.0 * np.pi, _PIECES + 1)
         steps = np.linalg.norm(np.diff(self._at(self._parameters, 0), axis=0), axis=1)
         self._lengths = np.concatenate([[0.0], np.cumsum(steps)])
         self.length = float(self._lengths[-1])
 
     def at(self, distance: float, speed: float) -> Motion:
-        """Return the motion after ``distance`` m along the path (round and round), at ``speed`` m/s."""
+        """Return the motion at ``distance`` m along the path, modulo ``length``, at ``speed`` m/s."""
         parameter = self._parameter(np.array([distance]))
         along = self._at(parameter, 1)[0]
-        # Where a path that degenerates to a line turns back, it has no direction for an instant.
-        length = max(float(np.linalg.norm(along)), _STILL)
+        # Where a path along a straight line turns back, its derivative is zero.
+        length = max(float(np.linalg.norm(along)), _MIN_LENGTH_M)
         return Motion(self._at(parameter, 0)[0], speed * along / length)
 
     def places(self, distances: Array) -> Array:
@@ -56,12 +56,12 @@ class ClosedPath:
         return self._at(self._parameter(distances), 0)
 
     def _parameter(self, distances: Array) -> Array:
-        within = distances % max(self.length, _STILL)
+        within = distances % max(self.length, _MIN_LENGTH_M)
         return np.asarray(np.interp(within, self._lengths, self._parameters))
 
     @property
     def sharpest(self) -> float:
-        """Largest curvature, 1/m: at v m/s it requires v² times that in m/s²."""
+        """Largest curvature κ (1/m): the path at speed v requires a lateral acceleration of up to v²κ."""
         first, second = self._at(self._parameters, 1), self._at(self._parameters, 2)
         bent = np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3
         return float(bent.max())
@@ -76,8 +76,9 @@ class ClosedPath:
 class Walk:
     """Motion along ``path``; times are µs.
 
-    It is at rest at the path's beginning, then accelerates with ``setting_out`` m/s² up to ``speed`` m/s,
-    round and round. ``paces`` (s after the start, m/s) are later speeds, reached with the same acceleration.
+    It rests at the path's beginning until ``begin``, then accelerates with ``setting_out`` m/s² to ``speed``
+    m/s and continues round after round. ``paces``: later speeds as (time since the start (s), speed (m/s)),
+    reached with the same acceleration.
     """
 
     def __init__(

@@ -27,7 +27,10 @@ class Prepared(NamedTuple):
 
 
 def prepare(name: str, options: Options) -> Prepared:
-    """Load a scenario by name or path and apply ``options``; raise InputError for any fault."""
+    """Load a scenario by name or path and apply ``options``.
+
+    Raises InputError for a faulty file or option, ModuleNotFoundError if ``jsbsim`` is required and missing.
+    """
     path = find("scenarios", name)
     scenario = apply(load(path, Scenario), options)
     if isinstance(scenario.target, RecordedTarget):
@@ -36,7 +39,7 @@ def prepare(name: str, options: Options) -> Prepared:
         frame = FleetFrame(origin.latitude, origin.longitude, origin.altitude)
         load_log(scenario.target, config_root() / "logs" / scenario.target.log, frame)
     if scenario.physics == "jsbsim":
-        # The same holds for a missing package.
+        # A missing package, too, must be detected before a run directory is made.
         import_module("jsbsim")
     vehicle = load(find("vehicles", scenario.vehicle), VehicleConfig)
     last = len(vehicle.rotors) - 1
@@ -60,7 +63,7 @@ def measure(prepared: Prepared, seed: int) -> dict[str, Value]:
 
 def measured(prepared: Prepared, seed: int) -> tuple[Outcome, dict[str, Value]]:
     """Fly as ``measure`` does, and return also the outcome."""
-    # Reading the CPU clock before and after every plan costs more than a hundredth of a flight.
+    # Reading the CPU clock before and after every plan takes more than 1 % of a flight's CPU time.
     flight = Flight(*prepared, seed, config_root() / "logs", stopwatch=lambda: 0)
     flight.run()
     outcome = flight.outcome

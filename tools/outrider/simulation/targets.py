@@ -1,4 +1,4 @@
-"""Target as a node: it sends GLOBAL_POSITION_INT on its link, and gives its true position to the harness."""
+"""Target as a node: it sends GLOBAL_POSITION_INT on its link; its true position is known to the harness."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Placed(Protocol):
     """Object with a known true position."""
 
     def begin(self, now: int) -> None:
-        """Start at the goal event: jump, or start the record."""
+        """Process the goal event at ``now`` (µs): jump, or start along the path or the record."""
         ...
 
     def position(self, now: int) -> Array | None:
@@ -55,7 +55,7 @@ class Target(Placed, Protocol):
         ...
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Step as every node."""
+        """Step as a ``Node``."""
         ...
 
     def move(self, now: int, place: Array) -> None:
@@ -76,7 +76,7 @@ class StandingTarget:
         self._beacon = Beacon(TARGET_SYSTEM, LINK, config.rate_hz, fleet)
 
     def begin(self, now: int) -> None:
-        """Jump and send the new position at once; later jumps count from ``now``."""
+        """Make the configured jump at ``now`` (µs), with a message at once, and schedule the later ones."""
         config = self._config
         self._jumps.extend((now + round(1e6 * jump.after_s), np.array(jump.to)) for jump in config.jumps)
         if config.jump_to is not None:
@@ -88,7 +88,7 @@ class StandingTarget:
         return self._place
 
     def move(self, now: int, place: Array) -> None:
-        """Stand at ``place`` from now on."""
+        """Stand at ``place`` (3,) from ``now`` (µs) until the next scheduled jump."""
         self._move(now)
         self._jump(now, np.array(place))
 
@@ -137,7 +137,7 @@ class Walking:
         return self.motion(now).position
 
     def move(self, now: int, place: Array) -> None:
-        """Shift the whole path so that the target is at ``place``."""
+        """Shift the whole path so that the target is at ``place`` (3,) at ``now`` (µs)."""
         self._aside = (0.0 if self._aside is None else self._aside) + place - self.motion(now).position
         self._beacon.hasten(now)
 
@@ -151,7 +151,8 @@ class Walking:
 class Recording(NamedTuple):
     """Frames of one sender.
 
-    ``times`` (n,) µs from the start of the piece, the bytes, and the true positions (n, 3) ENU.
+    ``times`` (n,): µs since the first of these frames. ``frames``: their bytes. ``positions`` (n, 3): the
+    positions in them, fleet-local ENU (m).
     """
 
     times: NDArray[np.int64]
@@ -160,7 +161,7 @@ class Recording(NamedTuple):
 
 
 class Recorded:
-    """Target that replays a piece of a tlog; its truth is the log, interpolated at the reception times."""
+    """Target that replays a piece of a tlog; its true position is interpolated between those of the log."""
 
     name = "target"
 
@@ -180,7 +181,7 @@ class Recorded:
     def position(self, now: int) -> Array | None:
         """Return the log's position interpolated at ``now``.
 
-        Before the start it is the first position of the log; after its end it is None.
+        Before the start it is the first position of the piece; after the end of the piece it is None.
         """
         times, places = self.recording.times, self.recording.positions
         since = 0 if self._start is None else now - self._start
@@ -196,7 +197,7 @@ class Recorded:
             self._aside = (0.0 if self._aside is None else self._aside) + place - here
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
-        """Send every frame whose time has come, byte for byte unless the target was moved."""
+        """Send every frame that is due; its bytes are unchanged unless the target was moved."""
         out: list[Datagram] = []
         if self._start is None:
             return out
@@ -207,7 +208,7 @@ class Recorded:
         return out
 
     def _told(self, frame: bytes) -> bytes:
-        """Return the frame, shifted to where the target was moved."""
+        """Return the frame; if the target was moved, encoded anew with the shifted position."""
         if self._aside is None:
             return frame
         out = b""
@@ -223,8 +224,8 @@ class Recorded:
 def load(config: RecordedTarget, path: Path, fleet: FleetFrame) -> Recording:
     """Return the piece of the log that ``config`` selects, in the order of time.
 
-    Raises InputError when there is no such log, when it ends before the piece does, or when it holds fewer
-    than two such messages there.
+    Raises InputError if the log cannot be read, if it ends more than ``SHORT`` before the piece, or if the
+    piece holds fewer than two GLOBAL_POSITION_INT of the system.
     """
     wanted = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, config.system
     codec = Codec(lambda identifier, system, _component: (identifier, system) == wanted)

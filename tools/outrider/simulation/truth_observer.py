@@ -65,7 +65,7 @@ def places(target: Placed, times: Iterable[int]) -> Array:
 
 
 def rows(autopilots: Sequence[Autopilot]) -> Array:
-    """Return the samples (K, ROW) of vehicles, ENU: see ``ground_truth.ROW``."""
+    """Return the samples (K, ROW) of the vehicles, ENU; columns: see ``ground_truth.ROW``."""
     ned = np.empty((len(autopilots), 5, 3))
     attitude = np.empty((len(autopilots), 4))
     for k, autopilot in enumerate(autopilots):
@@ -79,6 +79,6 @@ def rows(autopilots: Sequence[Autopilot]) -> Array:
     w, x, y, z = attitude.T
     yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     result[:, 15] = [yaw_to_enu(angle) for angle in yaw.tolist()]
-    # The angle between the body's and the world's vertical.
+    # Tilt: the angle between the vertical axes of body and world.
     result[:, 16] = 2.0 * np.arcsin(np.minimum(1.0, np.hypot(x, y)))
     return result

@@ -1,6 +1,6 @@
 """Command ``outrider sitl``: takes options, runs emulated vehicles for external tools to connect to.
 
-``request`` checks the options, ``addresses`` gives the endpoints of the firmware's own SITL, ``wiring`` opens
-them. ``processes`` forks one worker per group of vehicles; each group is one node under one loop.
+``request`` checks the options, ``addresses`` gives the endpoints of the firmware's own SITL, ``command``
+opens them. ``processes`` forks one worker per group of vehicles; each group is one node under one loop.
 ``shared_page`` passes the state to ``screen``. The vehicles run under the wall clock.
 """

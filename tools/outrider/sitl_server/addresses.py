@@ -22,10 +22,10 @@ from outrider.errors import InputError
 from outrider.sitl_server.request import FlavourName
 
 PORT_BASE: Final[dict[FlavourName, int]] = {"ardupilot": 5760, "px4": 14540}
-_EVERYWHERE: Final = ("0.0.0.0", "::")
+_ANY_ADDRESS: Final = ("0.0.0.0", "::")
 _LAST_PORT: Final = 65535
-_SERIALS: Final = (0, 2, 3)
-_INSTANCE: Final = 10
+_PORT_OFFSETS: Final = (0, 2, 3)
+_PORTS_PER_INSTANCE: Final = 10
 _OFFBOARD_PORTS: Final = 10
 # Offsets from PX4's base port of 14540.
 _OWN, _GROUND_STATION, _OWN_FOR_GROUND_STATION = 40, 10, 4030
@@ -80,9 +80,9 @@ def extra(text: str, count: int) -> Endpoint:
 
 
 def _ardupilot(base: int, index: int, host: str, more: tuple[Endpoint, ...]) -> Address:
-    first = base + _INSTANCE * index
-    ports = tuple(TcpIn(host, first + serial) for serial in _SERIALS)
-    to = str(TcpOut(_here(host) if host in _EVERYWHERE else host, first))
+    first = base + _PORTS_PER_INSTANCE * index
+    ports = tuple(TcpIn(host, first + serial) for serial in _PORT_OFFSETS)
+    to = str(TcpOut(_here(host) if host in _ANY_ADDRESS else host, first))
     return Address((*ports, *more), to, to.replace("tcp:", "tcpout://", 1))
 
 

@@ -11,10 +11,10 @@ from mavlink_bridge.links.udp import REMEMBERED, UdpCaller, UdpListener
 
 
 class Clients:
-    """Counter of the clients on a node's ``links``, polled now and then.
+    """Counter of the clients on the ``links`` of each vehicle, by the vehicle's name.
 
-    A client counts while it is connected, or if it was received within the last 10 s. Multicast does not
-    count: its receivers are unknown.
+    A TCP client counts while it is connected, a UDP client if it has sent something within the last 10 s.
+    Clients on multicast are not counted, because its receivers are unknown.
     """
 
     def __init__(self, links: Mapping[str, Sequence[Link]], clock: Clock) -> None:

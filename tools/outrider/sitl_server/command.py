@@ -26,7 +26,7 @@ from outrider.sitl_server.persistence import prepare
 from outrider.sitl_server.processes import Processes
 from outrider.sitl_server.request import Request
 
-_LOOK: Final = 0.1
+_POLL_PERIOD_S: Final = 0.1
 """Time between two polls of the board (s)."""
 
 
@@ -60,7 +60,7 @@ def run(asked: Request, terms: Terms) -> int:
                 _say(ready(asked, places))
             with watching(asked, places, processes.board) as look:
                 while not stopped and time.monotonic() < until:
-                    time.sleep(_LOOK)
+                    time.sleep(_POLL_PERIOD_S)
                     processes.check()
                     look()
         finally:
@@ -79,8 +79,8 @@ def _addresses(asked: Request, terms: Terms) -> list[Address]:
     open_to_all = [str(one) for one in places[0].endpoints if exposed(one)]
     if open_to_all and asked.key is None:
         sys.stderr.write(
-            f"outrider sitl: {', '.join(open_to_all)}: beyond this machine; unsigned MAVLink obeys everyone "
-            "who can send there: --signing-key FILE is against that\n"
+            f"outrider sitl: {', '.join(open_to_all)}: reachable from other machines, and everyone there can "
+            "command the vehicles; --signing-key FILE restricts this to holders of the key\n"
         )
     return places
 

@@ -6,18 +6,21 @@ from collections.abc import Iterator
 
 from outrider.logs.flight_modes import mode_name
 from outrider.sitl_server.request import Request
-from outrider.sitl_server.shared_page import SAYINGS, SharedPage, VehicleSnapshot
+from outrider.sitl_server.shared_page import MAX_TEXTS, SharedPage, VehicleSnapshot
 
 
 class EventFeed:
-    """Event feed; ``look`` returns each event once. The number of UDP clients is some seconds late."""
+    """Feed of differences between polls; a UDP client that has left is noticed after 10 s."""
 
     def __init__(self, asked: Request, board: SharedPage) -> None:
         self._asked, self._board = asked, board
         self._before = [VehicleSnapshot() for _ in range(asked.count)]
 
     def look(self) -> list[str]:
-        """Return one line for each event since the last call: time since boot (s), vehicle, event."""
+        """Return one line (s since boot, vehicle, event) for each change and new text since the last call.
+
+        Only the latest ``MAX_TEXTS`` texts of a vehicle are available.
+        """
         lines = []
         for index, system in enumerate(self._asked.systems):
             now = self._board.snapshot(index)
@@ -28,7 +31,7 @@ class EventFeed:
         return lines
 
     def _changes(self, index: int, before: VehicleSnapshot, now: VehicleSnapshot) -> Iterator[str]:
-        first = max(before.said, now.said - SAYINGS)
+        first = max(before.said, now.said - MAX_TEXTS)
         for number in range(first, now.said):
             yield f"says {self._board.saying(index, number)!r}"
         if before.up and now.custom_mode != before.custom_mode:

@@ -27,9 +27,9 @@ def ready(asked: Request, places: Sequence[Address]) -> dict[str, Value]:
 
 
 def summary(asked: Request, board: SharedPage, wall: float) -> dict[str, Value]:
-    """Return the summary ``wall`` seconds after the beginning.
+    """Return the summary of a run of ``wall`` seconds.
 
-    All worker processes must have been joined.
+    All worker processes must have been joined, so that their CPU time is included.
     """
     paces, times = board.paces(), os.times()
     vehicles: list[Value] = []
@@ -57,7 +57,7 @@ def summary(asked: Request, board: SharedPage, wall: float) -> dict[str, Value]:
 def factor(paces: Sequence[Pace], since: Sequence[Pace] = ()) -> float:
     """Return simulated over wall time of the slowest process.
 
-    With ``since`` it is counted from there, if wall time has passed since then in every process.
+    With ``since`` (earlier timings) it is the factor since then, if wall time has passed in every process.
     """
     before = since or [Pace()] * len(paces)
     spans = [

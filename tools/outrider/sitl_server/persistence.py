@@ -12,7 +12,7 @@ from outrider.errors import InputError
 from outrider.sitl_server.vehicle_group import VehicleGroup
 from sitl.autopilot.saved import Saved
 
-_IDS: Final = ("SYSID_THISMAV", "MAV_SYS_ID")
+_ID_PARAMETERS: Final = ("SYSID_THISMAV", "MAV_SYS_ID")
 
 
 class Persistence:
@@ -34,12 +34,12 @@ class Persistence:
             try:
                 kept = Saved.model_validate_json(path.read_bytes())
                 # Ids are given by --first-id: two vehicles must never share one.
-                others = {name: v for name, v in kept.parameters.items() if name not in _IDS}
+                others = {name: v for name, v in kept.parameters.items() if name not in _ID_PARAMETERS}
                 kept = kept.model_copy(update={"parameters": others})
             except (OSError, ValidationError) as error:
                 why = error.strerror if isinstance(error, OSError) else "it is damaged"
                 raise InputError(
-                    f"{path}: cannot be used: {why}; allowed: what a vehicle left there, or no such file"
+                    f"{path}: cannot be used: {why}; allowed: a file that outrider sitl wrote, or no file"
                 ) from None
         self._kept[system] = kept
         return kept

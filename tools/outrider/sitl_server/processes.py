@@ -17,8 +17,8 @@ from outrider.sitl_server.worker import PERIOD, STRIDE, Worker
 from sitl.autopilot.saved import Saved
 
 FULL: Final = 10
-"""Number of vehicles at real-time speed that fill one process before another is started."""
-_FAREWELL: Final = 5.0
+"""Number of vehicles, multiplied by the speed if above 1, that one process runs before another is added."""
+_STOP_TIMEOUT_S: Final = 5.0
 """Time limit for a process to end by itself (s)."""
 
 
@@ -50,14 +50,14 @@ class Processes:
         first = self._asked.autopilot(0, 0, Saved())
         for now in (0, PERIOD):
             first.step(now, [])
-        # One clock for all processes: vehicles of different processes fly in the same air.
+        # One clock for all processes, so that wind and vehicles of all processes have the same time.
         clock = PacedClock(WallClock(), self._asked.speed, STRIDE, self.board)
         for number, worker in enumerate(self._workers):
             self._children.start(str(number), self._child, worker, clock)
         self._close(None)
 
     def check(self) -> None:
-        """Raise OutriderError if a process has ended, which none does by itself."""
+        """Raise OutriderError if a process has ended, with the reason that it wrote or its exit status."""
         for name, status in self._children.ended().items():
             number = int(name)
             fault = self.board.fault(number) or f"its process ended with status {status}"
@@ -67,7 +67,7 @@ class Processes:
     def stop(self) -> None:
         """Ask all processes to end, wait for them, and kill those that do not end in time."""
         self.board.stop = True
-        self._children.join(_FAREWELL)
+        self._children.join(_STOP_TIMEOUT_S)
         self._close(None)
 
     def _child(self, worker: Worker, clock: PacedClock) -> None:

@@ -1,4 +1,4 @@
-"""Checked request of ``outrider sitl``: number and kind of vehicles, place, speed of time."""
+"""Options of ``outrider sitl``, and the checked request: vehicles, origin, physics, simulation speed."""
 
 from __future__ import annotations
 
@@ -33,9 +33,8 @@ StartupName = Literal["quick", "realistic"]
 
 MOST_ID: Final = 254
 """Highest system id of a vehicle: ground stations use 255."""
-_READY_AFTER: Final = {"ardupilot": 30.0, "px4": 20.0}
-# s from boot; ArduCopter's GPS and EKF take about 40 s, PX4's less.
-
+_READY_AFTER_S: Final = {"ardupilot": 30.0, "px4": 20.0}
+# Time (s) from boot to a known position; a real ArduCopter takes about 40 s, PX4 less.
 
 _PLACE: Final = "LATITUDE,LONGITUDE[,ALTITUDE], ±89 and ±180 degrees, −500 to 9000 m above the sea"
 
@@ -65,9 +64,9 @@ class Options:
 class Request:
     """Checked request.
 
-    ``speed``: simulated seconds per second of wall time. ``spacing``: distance (m) between vehicles on a grid
-    with that number of ``columns``, whose first corner is the ``origin``. ``key``: if given, only
-    messages signed with it are accepted.
+    ``speed``: simulated seconds per second of wall time. ``spacing``: distance (m) between neighbours on the
+    start grid; ``columns``: vehicles in a row of the grid, whose first vehicle is at ``origin``. ``key``: if
+    given, vehicles sign with it and accept only messages signed with it, except those of telemetry radios.
     """
 
     count: int
@@ -104,7 +103,7 @@ class Request:
         return self.spacing * (index % self.columns), self.spacing * (index // self.columns), 0.0
 
     def autopilot(self, index: int, epoch: int, saved: Saved) -> Autopilot:
-        """Return vehicle ``index``, which boots at ``epoch`` (Unix µs) with the data ``saved`` before."""
+        """Return vehicle ``index`` (from 0), which boots at ``epoch`` (Unix µs) with the state ``saved``."""
         return Autopilot(
             self._config(index, epoch),
             self.vehicle,
@@ -119,7 +118,7 @@ class Request:
         latitude, longitude, altitude = self.frame.to_geodetic(self.place(index))
         changes: dict[str, object] = {}
         if self.startup == "realistic":
-            changes = {"startup": "in stages", "ready_after": _READY_AFTER[self.flavour]}
+            changes = {"startup": "in stages", "ready_after": _READY_AFTER_S[self.flavour]}
         return AutopilotConfig(
             system_id=self.first_id + index,
             flavour=self.flavour,
@@ -130,7 +129,7 @@ class Request:
             sensors=self.sensors,
             physics=self.physics,
             response=self.response,
-            # Three cells are low at the 10.5 V of BATT_LOW_VOLT; PX4 uses relative thresholds.
+            # ArduPilot's default BATT_LOW_VOLT of 10.5 V suits three cells; PX4's thresholds are relative.
             battery=BatteryConfig(cells=3 if self.flavour == "ardupilot" else 4),
             epoch=epoch,
             **changes,
@@ -138,7 +137,11 @@ class Request:
 
 
 def checked(options: Options) -> Request:
-    """Return the options as a request. Raises InputError with one line for each fault."""
+    """Check the options and return the request.
+
+    Raises InputError with one line for each wrong word, number, system id or origin; faults of the wind, the
+    vehicle or the key raise it one at a time. Raises ModuleNotFoundError for ``jsbsim`` if not installed.
+    """
     words: dict[str, tuple[str, ...]] = {
         "flavour": get_args(FlavourName),
         "sensors": get_args(ProfileName),
@@ -160,7 +163,7 @@ def checked(options: Options) -> Request:
     if last > MOST_ID:
         wrong.append(
             f"--count {options.count} from --first-id {options.first_id}: system ids would go up to {last}; "
-            f"allowed is {MOST_ID}, as 255 is a ground station's"
+            f"the highest allowed is {MOST_ID}, because ground stations use 255"
         )
     origin = Origin() if options.origin is None else _origin(options.origin)
     if origin is None:
@@ -193,7 +196,7 @@ def checked(options: Options) -> Request:
 
 
 def _origin(text: str) -> Origin | None:
-    """Return the origin given as ``_PLACE`` describes; None if ``text`` has another form."""
+    """Parse ``text`` in the form of ``_PLACE``; return None if the form or a value is wrong."""
     try:
         numbers = [float(part) for part in text.split(",")]
         if len(numbers) not in (2, 3):

@@ -21,16 +21,16 @@ from outrider.sitl_server.figures import factor
 from outrider.sitl_server.request import Request
 from outrider.sitl_server.shared_page import Pace, SharedPage, VehicleSnapshot
 
-_REFRESH: Final = 0.5
+_REFRESH_S: Final = 0.5
 """Time between two pictures (s)."""
-_WINDOW: Final = 4
+_COUNT_WINDOW: Final = 4
 """Number of pictures over which messages per second are counted."""
-_LATELY: Final = 11
-"""Number of pictures over which the real-time factor is taken: it changes once a second."""
-_EVENTS: Final = 6
-_FRAME: Final = 6
+_PACE_WINDOW: Final = 11
+"""Number of pictures (5 s) over which the real-time factor is averaged; its inputs change once a second."""
+_EVENT_LINES: Final = 6
+_FRAME_LINES: Final = 6
 # Lines of the terminal that are neither vehicles nor events.
-_WIDE: Final = 96
+_WIDTH_WITH_HOSTS: Final = 96
 # Terminal width (columns) from which there is room for hosts.
 _COLUMNS: Final[dict[str, Literal["left", "right"]]] = {
     "id": "right",
@@ -57,9 +57,9 @@ class Screen:
         self._asked, self._places, self._board = asked, places, board
         self._console = console
         self._event_feed = EventFeed(asked, board)
-        self._events: deque[str] = deque(maxlen=_EVENTS)
-        self._counts: deque[tuple[float, list[tuple[int, int]]]] = deque(maxlen=_WINDOW)
-        self._paces: deque[list[Pace]] = deque(maxlen=_LATELY)
+        self._events: deque[str] = deque(maxlen=_EVENT_LINES)
+        self._counts: deque[tuple[float, list[tuple[int, int]]]] = deque(maxlen=_COUNT_WINDOW)
+        self._paces: deque[list[Pace]] = deque(maxlen=_PACE_WINDOW)
         self._drawn = 0.0
         # No refresh thread, which would take CPU time from the vehicles' processes.
         self.live = Live(console=console, auto_refresh=False)
@@ -68,14 +68,14 @@ class Screen:
         """Draw the current state, at most twice a second."""
         self._events.extend(self._event_feed.look())
         now = time.monotonic()
-        if now - self._drawn >= _REFRESH:
+        if now - self._drawn >= _REFRESH_S:
             self._drawn = now
             self.live.update(self._picture(now), refresh=True)
 
     def _picture(self, now: float) -> Group:
         every = [self._board.snapshot(index) for index in range(self._asked.count)]
         self._counts.append((now, [(snapshot.received, snapshot.sent) for snapshot in every]))
-        shown = max(1, min(self._asked.count, self._console.size.height - _FRAME - _EVENTS))
+        shown = max(1, min(self._asked.count, self._console.size.height - _FRAME_LINES - _EVENT_LINES))
         table = Table(
             title=self._title(), title_justify="left", box=box.SIMPLE, padding=(0, 1, 0, 0), show_edge=False
         )
@@ -104,7 +104,7 @@ class Screen:
             (new - old) / elapsed for new, old in zip(counts[index], before[index], strict=True)
         )
         place = self._places[index].pymavlink
-        if self._console.size.width < _WIDE:
+        if self._console.size.width < _WIDTH_WITH_HOSTS:
             kind, _, rest = place.partition(":")
             place = f"{kind[:3]}:{rest.rpartition(':')[2]}"
         return (

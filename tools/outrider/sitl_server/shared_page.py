@@ -1,7 +1,7 @@
 """Shared page of memory with the state of the vehicles.
 
-Each worker process writes its own rows, and any process reads them. A row may be half old; for display this
-does not matter.
+Each worker process writes its own rows, and any process reads them. A reader may find a partly updated row,
+which is acceptable for display.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from outrider.processes.shared_memory import SharedMemory
 
-SAYINGS: Final = 8
+MAX_TEXTS: Final = 8
 """Number of latest texts that are stored per vehicle."""
 
 
@@ -38,8 +38,8 @@ class VehicleSnapshot(NamedTuple):
 class Pace(NamedTuple):
     """Timing of one process.
 
-    Simulated and wall time (s) since its loop began, steps, steps that were late by more than a period,
-    deadlines without a step, lateness (simulated ms), and overruns.
+    Simulated and wall time (s) since its loop began, steps, ``misses``: steps that were late by more than
+    10 ms, of wall time at speeds above 1, deadlines without a step, lateness (simulated ms), and overruns.
     """
 
     simulated: float = 0.0
@@ -57,18 +57,18 @@ _GROUP: Final = len(Pace._fields)
 
 
 class SharedPage:
-    """Shared page for that number of vehicles and groups.
+    """Shared page for ``vehicles`` vehicles and ``groups`` groups.
 
-    It is created before the processes fork, which then share it.
+    It must be created before the processes are forked.
     """
 
     def __init__(self, vehicles: int, groups: int) -> None:
-        numbers, texts = vehicles * _VEHICLE + groups * _GROUP, vehicles * SAYINGS + groups
+        numbers, texts = vehicles * _VEHICLE + groups * _GROUP, vehicles * MAX_TEXTS + groups
         self._memory = memory = SharedMemory(2, numbers, texts)
         self._flags = memory.flags
         self._vehicles = memory.numbers[: vehicles * _VEHICLE].reshape(vehicles, _VEHICLE)
         self._groups = memory.numbers[vehicles * _VEHICLE :].reshape(groups, _GROUP)
-        self._faults = vehicles * SAYINGS
+        self._faults = vehicles * MAX_TEXTS
 
     @property
     def stop(self) -> bool:
@@ -81,7 +81,7 @@ class SharedPage:
 
     @property
     def lost(self) -> int:
-        """Simulated time (µs) that the processes could not keep up with; all of them lose it."""
+        """Simulated time (µs) that was skipped because a process was too slow; all processes skip it."""
         return int(self._flags[1])
 
     @lost.setter
@@ -113,11 +113,11 @@ class SharedPage:
 
     def say(self, index: int, number: int, text: str) -> None:
         """Write the text ``number`` (0…) of vehicle ``index``."""
-        self._memory.write(index * SAYINGS + number % SAYINGS, text)
+        self._memory.write(index * MAX_TEXTS + number % MAX_TEXTS, text)
 
     def saying(self, index: int, number: int) -> str:
         """Return the text ``number`` of vehicle ``index``, one of its latest."""
-        return self._memory.read(index * SAYINGS + number % SAYINGS)
+        return self._memory.read(index * MAX_TEXTS + number % MAX_TEXTS)
 
     def show_pace(self, group: int, pace: Pace) -> None:
         """Write the timing of group ``group``."""

@@ -54,10 +54,10 @@ class VehicleGroup:
         board: SharedPage,
         speed: float,
     ) -> None:
-        """Make a group.
+        """Create a group.
 
-        ``vehicles`` are mapped by their index among all, which is their row on the ``board``. ``boots``:
-        their boot times (µs). ``first_id``: system id of index 0. ``speed``: simulated seconds per second.
+        ``vehicles`` and ``boots`` (boot times, µs): by index among all vehicles, which is the row on the
+        ``board``. ``first_id``: system id of index 0. ``speed``: simulated seconds per second.
         """
         self.slots = [Slot(index, node, first_id + index, boots[index]) for index, node in vehicles.items()]
         self._board = board
@@ -76,7 +76,7 @@ class VehicleGroup:
             for datagram in arrived:
                 slot.traffic.receive(datagram.data)
             try:
-                # A late process must not make its vehicles younger than their clocks say.
+                # A vehicle's time begins with its first step: in a late process, too, this is the boot time.
                 late = not slot.booted and now > slot.boot
                 said = slot.node.step(slot.boot, []) if late else []
                 slot.booted = True

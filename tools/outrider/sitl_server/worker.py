@@ -25,17 +25,17 @@ from outrider.sitl_server.vehicle_group import VehicleGroup, boot_times
 
 PERIOD: Final = 10_000
 """Simulated time between two steps (µs), from real time up to 10 times as fast."""
-_FASTEST, _LONGEST = 10.0, 5.0
-_GRID: Final = 2500
-# µs; usual steps of physics.
+_MAX_SPEED_AT_PERIOD, _MAX_PERIOD_FACTOR = 10.0, 5.0
+# Largest speed with steps of PERIOD, and largest multiple of PERIOD at higher speeds; see ``period``.
+_PHYSICS_STEP_US: Final = 2500
 STRIDE: Final = 250_000
-"""Simulated time (µs) that is caught up at once after the machine was busy; anything beyond is lost."""
-_SHOWN: Final = 1.0
-# s between two records of the loop's timing.
+"""Largest simulated time (µs) between two waits; if the machine was busy for longer, the rest is lost."""
+_PACE_PERIOD_S: Final = 1.0
+# Time between two records of the loop's timing.
 
 
 class Worker:
-    """Worker of one group: ``indices`` are its vehicles, ``links`` theirs by index, ``group`` its row."""
+    """Worker of one group: its row ``group`` of the board, its vehicles ``indices``, ``links`` by index."""
 
     def __init__(
         self,
@@ -95,7 +95,7 @@ class Worker:
                 nonlocal looked
                 group.show(now, clients)
                 elapsed = time.monotonic() - began
-                if elapsed - looked >= _SHOWN:
+                if elapsed - looked >= _PACE_PERIOD_S:
                     looked = elapsed
                     self._board.show_pace(self._number, _pace(loop, now, elapsed))
                     persistence.keep(group)
@@ -110,10 +110,12 @@ class Worker:
 def period(speed: float) -> int:
     """Return the simulated time between two steps (µs) when time is ``speed`` times as fast.
 
-    It is 10 ms of wall time or less, and 1 ms or more as long as telemetry at 20 Hz remains possible.
+    It is a multiple of 2.5 ms: 10 ms of wall time up to real time, but at least 2.5 ms simulated; 10 ms
+    simulated up to 10 times as fast; above, 1 ms of wall time, but at most 50 ms simulated, so that telemetry
+    at 20 Hz remains possible.
     """
-    of_usual = speed if speed < 1.0 else min(max(speed / _FASTEST, 1.0), _LONGEST)
-    return max(int(PERIOD * of_usual) // _GRID, 1) * _GRID
+    of_usual = speed if speed < 1.0 else min(max(speed / _MAX_SPEED_AT_PERIOD, 1.0), _MAX_PERIOD_FACTOR)
+    return max(int(PERIOD * of_usual) // _PHYSICS_STEP_US, 1) * _PHYSICS_STEP_US
 
 
 def _pace(loop: RealTime, now: int, wall: float) -> Pace:

@@ -1,1 +1,1 @@
-"""Supervision of a companion: takes its datagrams, inhibits the take-off, and gives a hold on exit."""
+"""Supervision of a companion: inhibition of the take-off, detection of duplicate ids, hold on exit."""

@@ -1,6 +1,7 @@
-"""Detector of another sender with the own ids.
+"""Detector of another sender with the own system and component id.
 
-Either two vehicles have one system id, and each ignores the other, or two companions have one vehicle.
+Such a sender exists if two vehicles have the same system id, and so ignore each other, or if two companions
+control one vehicle.
 """
 
 from __future__ import annotations
@@ -14,20 +15,20 @@ from mavlink_bridge.wire.framing import leading_frames
 from mavlink_bridge.wire.header import Header
 
 REMEMBERED: Final = 4096
-"""Number of frames; more than a link sends until its echo is back."""
-_LASTS, _FORGOTTEN = 2_000_000, 10_000_000
+"""Number of sent frames kept; more than a link sends before an echo of the first one returns."""
+_MIN_SPAN_US, _MAX_SILENCE_US = 2_000_000, 10_000_000
 """Times, µs.
 
-A duplicate must be received over the first time, which is longer than messages of a previous companion remain
-under way. After the second time without messages it counts as gone.
+A duplicate counts when its messages span the first time, which is longer than the transport delay of messages
+of a previous companion. After the second time without messages it counts as gone.
 """
 
 
 class DuplicateIds:
     """Detector of a duplicate on the links of the companion of ``system``.
 
-    A duplicate is a sender that has the companion's ids, and whose frames are not, byte by byte, frames that
-    the companion sent itself. ``clock``: wall clock.
+    A duplicate is a sender with the companion's ids whose frames are not identical to the last
+    ``REMEMBERED`` frames of the companion itself. ``clock``: wall clock.
     """
 
     def __init__(self, system: int, clock: Clock) -> None:
@@ -39,21 +40,21 @@ class DuplicateIds:
         self._last: int | None = None
 
     def said(self, data: bytes) -> None:
-        """Record frames that leave."""
+        """Record the frames of a sent datagram."""
         for frame in leading_frames(data)[0]:
             mark = hash(frame.data)
-            # A frame that is sent again byte by byte is remembered from then on.
+            # If an identical frame is sent again, its age counts from the last time.
             self._said[mark] = None
             self._said.move_to_end(mark)
             if len(self._said) > REMEMBERED:
                 self._said.popitem(last=False)
 
     def received(self, header: Header, frame: bytes) -> None:
-        """Check a frame that arrives."""
+        """Check a received frame."""
         if (header.system, header.component) != self._own or hash(frame) in self._said:
             return
         now = self._clock.now()
-        if self._first is None or self._last is None or now - self._last > _FORGOTTEN:
+        if self._first is None or self._last is None or now - self._last > _MAX_SILENCE_US:
             self._first = now
         self._last = now
 
@@ -63,4 +64,4 @@ class DuplicateIds:
         first, last = self._first, self._last
         if first is None or last is None:
             return False
-        return last - first >= _LASTS and self._clock.now() - last <= _FORGOTTEN
+        return last - first >= _MIN_SPAN_US and self._clock.now() - last <= _MAX_SILENCE_US

@@ -1,8 +1,8 @@
 """Companion under supervision: its clock follows the autopilot's, and it can be replaced by a hold on exit.
 
 Until the rate of that clock is known, nothing is received from or sent to the swarm and the target, because
-their messages are dated by their clocks relative to the own one, and no order to take off is accepted. Orders
-are not accepted either while another sender has the own ids; then a pending order is withdrawn.
+the ages of their messages are computed on the own clock, and no order to take off is accepted. Nor is one
+accepted while another sender has the own ids; then a pending order to take off is withdrawn.
 """
 
 from __future__ import annotations
@@ -22,13 +22,12 @@ from outrider.supervision.duplicate_ids import DuplicateIds
 from outrider.supervision.takeoff_inhibit import TakeoffInhibit
 
 CLOCK = "the rate of the autopilot's clock"
-TWIN = "the other companion with this system id to fall silent"
-"""Conditions for which any order to take off has to wait."""
+DUPLICATE = "the other companion with this system id to fall silent"
+"""``CLOCK`` and ``DUPLICATE``: conditions for which any order to take off has to wait, as text."""
 OURS = (Phase.PREPARE, *STEERED, Phase.LAND)
 """Phases in which the companion controls the vehicle.
 
-Before and after these phases, and when another controller took the vehicle, the companion does not interfere,
-in whatever mode the vehicle flies.
+In all other phases, as when another controller has taken over the vehicle, no hold is requested on exit.
 """
 _OTHERS = ("swarm", "target")
 
@@ -36,9 +35,9 @@ _OTHERS = ("swarm", "target")
 class SupervisedNode:
     """``Node`` that supervises a companion.
 
-    ``followed``: clock that receives the autopilot's stamps, as far as the companion accepts them; None for a
+    ``followed``: clock that receives the autopilot's time stamps that the companion accepts; None for a
     companion on wall time. ``signing``: the companion's. ``duplicates``: detector of duplicates on its links;
-    not used for a dry run, which has other ids, because the real companion may be present as well.
+    unused in a dry run, whose component id differs from that of a companion that may be present as well.
     """
 
     def __init__(
@@ -68,13 +67,13 @@ class SupervisedNode:
     def barred(self) -> str:
         """The condition for which any order to take off has to wait; empty for none."""
         if self._duplicates is not None and self._duplicates.seen:
-            return TWIN
+            return DUPLICATE
         return "" if self.settled else CLOCK
 
     def give_up(self) -> None:
         """Stop the set-points and send the hold on exit from now on.
 
-        Called when the process is no longer supervised.
+        Called when the parent process is lost.
         """
         if self.last is None:
             pilot = self.companion.pilot
@@ -93,11 +92,11 @@ class SupervisedNode:
         answers: list[Datagram] = []
         if (barred := self.barred) and not isinstance(self.companion, DryRun):
             inbox, answers = self._gate.closed(inbox)
-        if barred == TWIN:
+        if barred == DUPLICATE:
             # The duplicate was unknown when the order was given.
             self.companion.pilot.take_back()
-        if (barred == TWIN) != self._warned:
-            self._warned = barred == TWIN
+        if (barred == DUPLICATE) != self._warned:
+            self._warned = barred == DUPLICATE
             self.companion.reporter.report(Severity.CRITICAL, "Own system id used twice", begins=self._warned)
         leaving = self.companion.step(now, inbox) + answers
         stamp = self.companion.world.stamp

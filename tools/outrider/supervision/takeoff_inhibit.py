@@ -17,7 +17,7 @@ from mavlink_bridge.wire.signing import Signing
 
 
 class TakeoffInhibit:
-    """Filter of orders to the companion of ``system``; ``signing``: the companion's."""
+    """Filter of orders to the companion of ``system``; ``signing``: the companion's, None for none."""
 
     def __init__(self, system: int, signing: Signing | None) -> None:
         self._own = Source(system, COMPONENT)

@@ -36,7 +36,7 @@ __all__ = [
 class Pace(NamedTuple):
     """Pace of a flight: lock-step, or real time with one process per node.
 
-    With ``priority`` these processes have real-time priority.
+    With ``priority`` these processes request real-time priority.
     """
 
     real_time: bool = False
@@ -56,8 +56,8 @@ def fly(
 ) -> dict[str, Value]:
     """Fly the scenario, and return the summary.
 
-    Logs, the resolved configuration, the summary and the figure are written to ``directory``; ``show``
-    displays the flight meanwhile. Raises OutriderError if the flight is interrupted.
+    Logs, the resolved configuration, plans, truth, summary and figure are written to ``directory``; ``show``
+    displays the flight. Raises OutriderError if the flight is interrupted.
     """
     with interruptible(f"{directory} keeps the configuration and the logs up to there, but no summary"):
         scenario = prepared.scenario

@@ -1,4 +1,4 @@
-"""View of a lock-step flight: sends its snapshots, and applies commands of the view."""
+"""View of a lock-step flight: sends snapshots of the flight, and applies the viewer's commands."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class LockStepView:
         self.orders = Orders()
 
     def __call__(self, flight: Flight, now: int) -> None:
-        """Send a snapshot if one is due, apply commands, and keep the pace."""
+        """Send a snapshot and apply commands if they are due, then wait to keep the pace."""
         wall = time.monotonic()
         if wall >= self._next:
             self._next = wall + PICTURE

@@ -8,14 +8,14 @@ from collections.abc import Callable
 from outrider.scene.view_commands import ViewCommands
 
 LEASE = 2.0
-"""s for which a command applies after it was received."""
+"""Time for which a command applies after it was received (s)."""
 STEP = 100_000
-"""µs of a single step."""
-_NAP = 0.02
+"""Simulated time of a single step (µs)."""
+_NAP_S = 0.02
 
 
 class Pace:
-    """Pace by the commands of a view; ``clock`` (s) and ``nap`` are those of wall time."""
+    """Pace by the commands of a view; ``clock``: wall clock (s); ``nap``: sleep for so many s."""
 
     def __init__(
         self, clock: Callable[[], float] = time.monotonic, nap: Callable[[float], None] = time.sleep
@@ -28,7 +28,7 @@ class Pace:
         self._anchor: tuple[float, int, float | None] | None = None
 
     def receive(self, commands: ViewCommands, now: int) -> None:
-        """Take commands, while the simulation is at ``now`` (µs)."""
+        """Process received commands, while the simulation is at ``now`` (µs)."""
         if self._steps is None:
             self._steps = commands.steps
         if commands.steps > self._steps:
@@ -37,23 +37,23 @@ class Pace:
         self._commands, self._said = commands, self._clock()
 
     def wait(self, now: int, listen: Callable[[], None]) -> None:
-        """Wait before the simulation continues from ``now`` (µs), for as long as is commanded.
+        """Wait before the simulation continues from ``now`` (µs), as long as the commands require.
 
-        ``listen`` receives the commands that arrive meanwhile.
+        ``listen()`` is called after each nap to receive new commands.
         """
         while (rest := self._rest(now)) > 0.0:
-            self._nap(min(rest, _NAP))
+            self._nap(min(rest, _NAP_S))
             listen()
 
     def _rest(self, now: int) -> float:
-        """Return the time to wait (s) by the present commands."""
+        """Return the time to wait (s) by the present commands; not positive for none."""
         clock, commands = self._clock(), self._commands
         if clock - self._said > LEASE:
             self._anchor = None
             return 0.0
         if commands.paused:
             self._anchor = None
-            return 0.0 if now < self._until else _NAP
+            return 0.0 if now < self._until else _NAP_S
         self._until = 0
         if commands.speed is None:
             self._anchor = None
@@ -63,6 +63,6 @@ class Pace:
         since, begin, speed = self._anchor
         due = since + 1e-6 * (now - begin) / commands.speed
         if due < clock - 0.5:
-            # A simulation that cannot keep up does not catch up afterwards.
+            # A simulation more than 0.5 s late does not run faster afterwards to catch up.
             self._anchor = clock, now, speed
         return due - clock

@@ -62,7 +62,10 @@ class FlightView:
 
 @contextmanager
 def showing() -> Iterator[FlightView]:
-    """Open a view on this machine, and close it afterwards; raise InputError if that is impossible."""
+    """Open a view on this machine, and close it afterwards.
+
+    Raises InputError if the page cannot be served, ModuleNotFoundError without the extra ``view``.
+    """
     viewer = ViewerClient()
     try:
         sys.stderr.write(f"{viewer.url} shows the flight\n")

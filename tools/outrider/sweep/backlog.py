@@ -17,7 +17,7 @@ class Backlog:
     def __init__(self, tasks: Iterable[Task]) -> None:
         self._waiting = deque(tasks)
         self._again: deque[Task] = deque()
-        self._tried: set[tuple[str, int]] = set()
+        self._retried: set[tuple[str, int]] = set()
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -36,9 +36,9 @@ class Backlog:
         return self._waiting.popleft()
 
     def lost(self, task: Task) -> None:
-        """Schedule a started task whose worker is gone for a second attempt, unless it was lost before."""
-        if task.run not in self._tried:
-            self._tried.add(task.run)
+        """Schedule a second attempt of a started task whose worker is gone, unless it was lost before."""
+        if task.run not in self._retried:
+            self._retried.add(task.run)
             self._again.append(task)
 
     def put_back(self, task: Task) -> None:

@@ -1,7 +1,7 @@
 """Cells of a sweep: each combination of the grid as a checked scenario or scene.
 
 A scene draws a scenario for each seed. All cells are checked before anything is flown. The key of a cell is a
-hash of everything that its runs depend on.
+hash of its scenario (or scene) and its vehicle; seeds and software versions are not part of it.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ _Dumper.add_representer(str, _Dumper.represent_str)
 def _cell(sweep: Sweep, point: Point, number: int) -> Cell:
     if sweep.scenes:
         scene = _changed(find("scenes", point.source), Scene, point)
-        # All scenarios are drawn now: one that cannot be placed must not end the sweep half-way.
+        # All scenarios are drawn now, so that a lack of room is an error before the first flight.
         drawn = [_drawn(scene, seed) for seed in sweep.seeds]
         name, document = scene.name, scene.model_dump_json()
         vehicle = _flyable(drawn[0])
@@ -147,15 +147,15 @@ def _drawn(scene: Scene, seed: int) -> Scenario:
 def _flyable(scenario: Scenario) -> str:
     """Return the scenario's vehicle as JSON.
 
-    The scenario is loaded from a file as ``outrider swarm`` does when a run is replayed. Raises InputError if
-    it does not come back unchanged.
+    The scenario is written to a file and loaded as ``outrider swarm`` does when a run is replayed. Raises
+    InputError if this changes the scenario.
     """
     with tempfile.TemporaryDirectory(prefix="outrider-") as folder:
         path = Path(folder) / "scenario.yaml"
         path.write_text(scenario_text(scenario), encoding="utf-8")
         prepared = prepare(str(path), Options())
     if prepared.scenario != scenario:
-        raise InputError("does not come back from a file as it was")
+        raise InputError("the scenario changes when it is written to a file and loaded again")
     return prepared.vehicle.model_dump_json()
 
 

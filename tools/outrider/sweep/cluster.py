@@ -33,7 +33,7 @@ PATIENCE_S = 300.0
 """Time (s) that a sweep waits for a worker."""
 _IDENTIFY = "__import__('outrider.sweep.dask_tasks', fromlist=['identify']).identify()"
 """Given as text: a Dask worker that cannot find a function ends, and outrider may not be installed there."""
-_TICK_S, _LOOK_S, _FETCH_S, _GOODBYE_S, _REPLY_S = 0.5, 1.0, 2.0, 3.0, 20.0
+_TICK_S, _POLL_PERIOD_S, _FETCH_TIMEOUT_S, _CLOSE_TIMEOUT_S, _REPLY_TIMEOUT_S = 0.5, 1.0, 2.0, 3.0, 20.0
 
 
 @dataclass
@@ -89,13 +89,13 @@ class Cluster:
         for goodbye in (self._dismiss, self._client.close):
             thread = Thread(target=_quietly, args=(goodbye,), daemon=True)
             thread.start()
-            thread.join(_GOODBYE_S)
+            thread.join(_CLOSE_TIMEOUT_S)
 
     def work(self, tasks: Iterable[Task], ended: Ended, tick: Callable[[], None] = lambda: None) -> None:
         """Run all tasks, as `Pool.work` does.
 
-        Raises InputError if there are workers but none is accepted, AbandonedError if the scheduler is gone
-        or there has been no worker for too long.
+        Raises InputError if all workers are refused before any run has ended, AbandonedError if the scheduler
+        is gone or there has been no accepted worker for ``patience_s``.
         """
         backlog = Backlog(tasks)
         self._served = time.monotonic()
@@ -110,7 +110,7 @@ class Cluster:
     def _look(self, backlog: Backlog, ended: Ended) -> None:
         """Check once a second which workers have joined and which are gone."""
         now = time.monotonic()
-        if now - self._looked < _LOOK_S:
+        if now - self._looked < _POLL_PERIOD_S:
             return
         self._looked = now
         there = self._there()
@@ -129,7 +129,7 @@ class Cluster:
         """Return the number of threads of each worker, by its address."""
         scheduler = self._client.scheduler
         try:
-            return dict(self._client.sync(scheduler.ncores, workers=None, callback_timeout=_REPLY_S))
+            return dict(self._client.sync(scheduler.ncores, workers=None, callback_timeout=_REPLY_TIMEOUT_S))
         except Exception:
             # Any exception that Dask raises for a connection that has ended or does not answer.
             raise self._abandoned("has gone") from None
@@ -172,7 +172,7 @@ class Cluster:
                 wait = 0.0
                 flight = self._flights.get(future.key)
                 if flight is not None and not self._answered(flight, backlog, ended):
-                    # Tried again next time; not now, or gone workers would not be noticed.
+                    # Retried at the next call: `_look` must run in between to detect workers that are gone.
                     self._answers.put(future)
                     return
 
@@ -186,7 +186,7 @@ class Cluster:
     def _fetched(self, future: Future[Any]) -> dict[str, Any] | None:
         """Return the answer of a worker; None if it is slow, or was lost with a dead worker (see `_look`)."""
         try:
-            answer: dict[str, Any] = future.result(timeout=_FETCH_S)
+            answer: dict[str, Any] = future.result(timeout=_FETCH_TIMEOUT_S)
         except FutureCancelledError:
             raise self._abandoned("has gone") from None
         except KilledWorker:

@@ -35,7 +35,7 @@ class WorkerProcesses:
         self._over: set[str] = set()
 
     def take(self, sweep: str, run: str) -> Process | None:
-        """Return a ready process or a new one; None for a sweep that has ended."""
+        """Return an idle process or a new one; None for a sweep that has ended."""
         with self._lock:
             if sweep in self._over:
                 return None
@@ -102,9 +102,8 @@ def fly(worker_id: str, sweep: str, run: str, wall_limit_s: float, document: str
 
     ``document``: the ``Task`` as JSON; ``run``: the ``module:function`` that flies it; ``sweep``: id of the
     sweep; ``worker_id``: the expected ``WORKER_ID``; ``wall_limit_s``: longest wall time of the run (s).
-    The result has one
-    key: ``entry``, the ``Entry`` as a dict; or ``restarted`` if this is another worker; or ``unable``, the
-    reason why no process can be started here.
+    The result has one key: ``entry``, the ``Entry`` as a dict; or ``restarted`` if this is another worker; or
+    ``unable``, the reason why no process can be started here.
     """
     if worker_id != WORKER_ID:
         return {"restarted": True}

@@ -1,8 +1,8 @@
 """Directory of a sweep, and the commands that replay its runs.
 
 ``journal.jsonl`` · ``summary.json``, ``.html``, ``.parquet`` · ``runs.parquet`` · ``sweep.png`` · ``cells/``:
-scenarios as flown, so that a command names one exactly even if the shipped files change · ``replays/``: the
-run directories of those commands.
+scenarios as flown, so that the commands do not depend on the shipped files · ``replays/``: the run
+directories of the commands.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ JOURNAL, SUMMARY, PICTURE = "journal.jsonl", "summary.json", "sweep.png"
 def prepare(out: Path | None, name: str) -> Path:
     """Return the directory ``out``, or ``runs/sweep-NAME``: new, empty, or that of a sweep.
 
-    The same command finds the directory again and so resumes the sweep. Raises InputError if it holds other
-    files or cannot be created.
+    The same command finds the directory again and so resumes the sweep. Raises InputError if it holds files
+    but no journal, or cannot be created.
     """
     directory = out if out is not None else Path("runs") / f"sweep-{name}"
     try:

@@ -1,7 +1,7 @@
 """Scenario drawn from a scene and a seed, the same every time.
 
-Every quantity has its own stream of random numbers, so that a change of the difficulty changes only what it
-is meant to change.
+Each group of quantities has its own stream of random numbers, so that a change of one group does not redraw
+the others.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from outrider.sweep.scenes import Scene, Things
 from outrider.sweep.trouble import strike
 
 _MARGIN = 10.0
-"""Distance (m) around all positions within which the planner may move."""
-_LEAST_RADIUS = 4.0
+"""Margin (m) of the planner's box around all starts, goals and the circle of the escort."""
+_MIN_RADIUS = 4.0
 """Least radius (m) of the circle around an escorted target; the radius grows with the number of vehicles."""
 
 
@@ -45,10 +45,10 @@ def vehicles(scene: Scene, seed: int) -> int:
     return int(stream(seed, Stream.SCENE_FLEET).integers(scene.vehicles[0], scene.vehicles[1] + 1))
 
 
-def dials(scene: Scene, count: int, seed: int) -> SceneParameters:
+def scene_parameters(scene: Scene, count: int, seed: int) -> SceneParameters:
     """Return every parameter at the scene's difficulty, for ``count`` vehicles.
 
-    Obstacles that the scene gives by a total number are drawn by the seed.
+    If the scene bounds the total number of obstacles, the seed draws the number.
     """
     random = stream(seed, Stream.SCENE_COUNTS)
 
@@ -82,7 +82,7 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
     Raises InputError if there is no room for everything that it must contain.
     """
     count = vehicles(scene, seed)
-    dial = dials(scene, count, seed)
+    dial = scene_parameters(scene, count, seed)
     where = f"scene {scene.name!r}, seed {seed}"
     starts = scatter(stream(seed, Stream.SCENE_STARTS), scene, count, dial.half, f"{where}: start")
     document: dict[str, JsonValue] = {
@@ -101,7 +101,7 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
         kept = [Circles(np.vstack([starts, goals])[:, :2], np.zeros(2 * count))]
     else:
         goals = None
-        radius = round(max(_LEAST_RADIUS, count * scene.apart / (2.0 * math.pi)), 3)
+        radius = round(max(_MIN_RADIUS, count * scene.apart / (2.0 * math.pi)), 3)
         extent = max(dial.half, dial.length)
         places = walk(stream(seed, Stream.SCENE_TARGET), dial.jumps, dial.length, extent)
         last_jump = (dial.jumps - 1) * dial.every_s
@@ -129,7 +129,7 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
     if scene.trouble is not None:
         struck = strike(scene.trouble, count, stream(seed, Stream.SCENE_TROUBLE))
         document = overlay(document, leaves(struck))
-    # Three times the longest path, and a minute after the last jump.
+    # From the last jump: a minute, and three times the duration of the longest path at full speed.
     way = 2.0 * math.sqrt(2.0) * (extent + radius)
     document["cap_s"] = float(min(3600, math.ceil(last_jump + 60.0 + 3.0 * way / dial.speed)))
     return overlay(document, leaves(scene.scenario))

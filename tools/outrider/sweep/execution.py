@@ -22,8 +22,8 @@ class Workers(Protocol):
     def work(self, tasks: Iterable[Task], ended: Ended, tick: Callable[[], None]) -> None:
         """Run all tasks.
 
-        ``ended`` is called for each run that has ended, for a lost run each time; ``tick`` is called at least
-        every second or so. Raises AbandonedError if the remaining tasks cannot be run.
+        ``ended`` is called for each run that has ended, and for each loss of a run; ``tick`` is called about
+        once a second or more often. Raises AbandonedError if the remaining tasks cannot be run.
         """
 
 

@@ -128,7 +128,7 @@ def overlay(document: Mapping[str, JsonValue], changes: Mapping[str, JsonValue])
 def leaves(document: Mapping[str, JsonValue], prefix: str = "") -> dict[str, JsonValue]:
     """Return the values of nested mappings by dotted key; empty mappings are dropped.
 
-    This is the inverse of `overlay`.
+    `overlay` of the result on an empty document restores the mappings that are not empty.
     """
     found: dict[str, JsonValue] = {}
     for key, value in document.items():

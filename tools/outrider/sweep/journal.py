@@ -1,8 +1,8 @@
-"""Journal of a sweep: one JSON line for each finished run, appended and never changed.
+"""Journal of a sweep: a header, then a JSON line for each run that ended or was lost; lines never change.
 
 A line counts when its newline is written; an incomplete line after the last newline is removed on resume.
-Each line is one write on a file opened to append. It reaches the disk at most `SYNC_S` later (as long as the
-sweep runs) or when the journal closes. The file is locked while a sweep uses it.
+Each line is one write on a file opened to append. It is synced to the disk about `SYNC_S` later, or when the
+journal closes. The file is locked while a sweep uses it.
 """
 
 from __future__ import annotations
@@ -168,6 +168,6 @@ def _entry(value: object) -> Entry | None:
 
 def _damaged(path: Path, number: int) -> InputError:
     return InputError(
-        f"{path}:{number}: is damaged, and not at the end, where a kill may tear a line; allowed: a whole "
+        f"{path}:{number}: is damaged, although only the last line may be incomplete; allowed: a whole "
         "journal, or another --out"
     )

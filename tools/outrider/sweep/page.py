@@ -17,12 +17,12 @@ from outrider.sweep.report import METHOD, CellReport, Named, exit_status
 from outrider.sweep.table import rows
 
 PAGE = "summary.html"
-_MORE = "img { max-width: 100%; background: #fff; } td.number { text-align: right; }"
+_STYLE = "img { max-width: 100%; background: #fff; } td.number { text-align: right; }"
 
 
 def write(path: Path, name: str, cells: Sequence[CellReport], picture: Path) -> None:
     """Write the page; ``picture`` is an existing PNG."""
-    style = "\n".join([*map(static, STYLES), _MORE])
+    style = "\n".join([*map(static, STYLES), _STYLE])
     digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode("ascii")
     policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; "
     policy += "base-uri 'none'; form-action 'none'"

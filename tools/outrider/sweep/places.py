@@ -20,13 +20,13 @@ from outrider.sweep.scenes import Scene
 Array = NDArray[np.float64]
 
 _BATCH, _ROUNDS = 32, 160
-"""Number of candidates tried at once, and number of trials before a position is given up."""
+"""Number of candidates in a batch, and number of batches after which the search for a position fails."""
 
 
 class Circles(NamedTuple):
     """Positions (n, 2) and radii (n,), m, that obstacles keep clear of; points have radius 0.
 
-    If ``hollow``, only the circle itself is kept clear: the inside is as good as the outside.
+    If ``hollow``, only the circle line is kept clear; obstacles may be inside.
     """
 
     centres: Array
@@ -81,10 +81,10 @@ def obstacles(
     kept: Sequence[Circles],
     where: str,
 ) -> list[JsonValue]:
-    """Return ``counts`` of spheres, then posts, as in a scenario file.
+    """Return ``counts[0]`` spheres, then ``counts[1]`` posts, as in a scenario file.
 
-    Each is ``clear`` of the circles in ``kept`` and has a ``gap`` to the others, in a square of ± ``extent``
-    m. Raises InputError if there is no room.
+    Their centres are in a square of ± ``extent`` m. Horizontally, each surface is at least ``clear`` from the
+    circles in ``kept`` and ``gap`` from other obstacles. Raises InputError if there is no room.
     """
     placed = np.empty((0, 3))
     found: list[JsonValue] = []

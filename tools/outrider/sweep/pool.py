@@ -24,7 +24,7 @@ _TICK_S = 0.5
 class Pool:
     """Pool of ``jobs`` workers that call ``run``, a ``module:function``.
 
-    It is a context manager, which leaves no process behind in any case.
+    It is a context manager that ends all its workers on exit.
     """
 
     def __init__(self, run: str, jobs: int, wall_limit_s: float) -> None:
@@ -49,7 +49,7 @@ class Pool:
     def work(self, tasks: Iterable[Task], ended: Ended, tick: Callable[[], None] = lambda: None) -> None:
         """Run all tasks.
 
-        ``ended`` is called at once for each run that has ended, for a lost run each time. ``tick`` is called
+        ``ended`` is called for each run that has ended, and for each loss of a run. ``tick`` is called
         at least every half second. Raises OutriderError if no worker can be started.
         """
         backlog = Backlog(tasks)

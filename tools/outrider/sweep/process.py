@@ -67,7 +67,7 @@ class Process:
             self._input.flush()
 
     def receive(self) -> None:
-        """Read available output; call it when the pipe is readable, which may be its end."""
+        """Read available output, or wait for some; at the end of the output ``dead`` becomes true."""
         data = os.read(self.output.fileno(), 1 << 20)
         self.dead = not data
         *lines, self._buffer = (self._buffer + data).split(b"\n")

@@ -60,7 +60,7 @@ class ResultCounter:
 
 @contextmanager
 def watching(total: int, finished: int) -> Iterator[ResultCounter]:
-    """Provide a `Watch` over ``total`` runs, ``finished`` of which have ended already."""
+    """Provide a `ResultCounter` of ``total`` runs, ``finished`` of which have ended already."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield ResultCounter(total, finished, None)

@@ -27,7 +27,7 @@ def prepare(folder: Path) -> None:
 
 
 def write(folder: Path, sweep: str, cells: Sequence[Cell], runs: Mapping[str, Sequence[Run]]) -> list[Path]:
-    """Write a file to ``folder`` for each run that did not end well, and return the files.
+    """Write a file to ``folder`` for each run that did not end well; return all these files, also older ones.
 
     The names are SWEEP-CELL-KEY-seedN.yaml, where KEY is the start of the cell's key. A file starts with the
     reason and the command that flies it. ``runs`` holds the runs of each cell by its key. An existing file
@@ -54,7 +54,7 @@ def _text(path: Path, sweep: str, cell: Cell, run: Run) -> str:
         words.append(f"least separation {run.separation:g} m")
     if run.what:
         words.append(run.what)
-    # Each on one line, even if an error or a label has several.
+    # Line breaks of an error or a label would end the YAML comment.
     why, label = (" ".join(text.split()) for text in (", ".join(words), cell.label))
     command = shlex.join(["outrider", "swarm", path.name, "--seed", str(run.seed)])
     head = f"{_MARK}: sweep {sweep}, {label}, seed {run.seed}: {why}\n# {command}\n"

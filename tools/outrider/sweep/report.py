@@ -37,7 +37,7 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class Named:
-    """Run that needs attention: the reason, its figures, and the command that flies it again."""
+    """Run listed in the report: the reason, its figures, and the command that flies it again."""
 
     seed: int
     why: str
@@ -119,7 +119,7 @@ def cell_report(label: str, key: str, runs: Sequence[Run], command: Command) -> 
 def exit_status(cells: Iterable[CellReport]) -> int:
     """Return 0 if all runs ended well, 1 for a violation or a goal not reached, 3 for an error or a lost run.
 
-    The last one takes precedence.
+    3 takes precedence over 1.
     """
     cells = list(cells)
     if any(cell.faults or cell.lost for cell in cells):

@@ -10,10 +10,10 @@ from outrider.sweep.tasks import Entry
 
 
 class Ending(Enum):
-    """Result of a run, the worst first.
+    """Result of a run; if several apply, the first.
 
-    ``STUCK``: not converged within the time limit, without a violation. ``FAILED``: the flight failed or a
-    vehicle fell. ``FAULT``: it raised an error. ``LOST``: its worker died or was too slow.
+    ``FAILED``: the flight failed or a vehicle fell. ``STUCK``: not converged within the time limit.
+    ``FAULT``: the run raised an error. ``LOST``: its worker died or was too slow.
     """
 
     VIOLATION = "violation"
@@ -29,7 +29,7 @@ class Run(NamedTuple):
 
     ``seconds`` to converge: inf if it did not, None if there was no goal. ``separation``: least distance
     between vehicles, m; ``to_obstacle``: least distance from a centre to a surface, m. ``yaw`` (deg) and
-    ``tracking`` (m) are the run's 95th percentiles. ``what`` describes an error.
+    ``tracking`` (m) are the run's 95th percentiles. ``what`` describes the error, the loss or the failure.
     """
 
     seed: int

@@ -41,7 +41,7 @@ class Density(Part):
 
 
 class Speed(Part):
-    """Largest horizontal speed, m/s."""
+    """Largest speed along each axis, m/s."""
 
     easy: float = Field(ge=0.5, le=9.0)
     hard: float = Field(ge=0.5, le=9.0)
@@ -80,7 +80,7 @@ class Things(Part):
 
     per_vehicle: PerVehicle | None = None
     count: tuple[Number, Number] | None = Field(
-        None, description="least and most, whatever the vehicles; drawn evenly"
+        None, description="least and most, independent of the number of vehicles; drawn uniformly"
     )
 
     @model_validator(mode="after")
@@ -121,12 +121,12 @@ class Scene(Part):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,50}$")
     description: str = ""
     task: Literal["goto", "escort"] = Field(
-        description="goto: everyone to an own place; escort: a target that jumps"
+        description="goto: each vehicle flies to its own goal; escort: of a target that jumps"
     )
     vehicles: tuple[Annotated[int, Field(ge=2, le=200)], Annotated[int, Field(ge=2, le=200)]] = Field(
-        description="least and most; drawn evenly"
+        description="least and most; drawn uniformly"
     )
-    difficulty: Share = Field(0.5, description="0 turns every dial to its easy end, 1 to its hard end")
+    difficulty: Share = Field(0.5, description="0: all parameters are easy, 1: all are hard")
     density: Density
     speed: Speed
     height: Span = Field((4.0, 6.0), description="m above ground, of starts and goals")
@@ -138,12 +138,12 @@ class Scene(Part):
     spheres: Balls | None = None
     posts: Poles | None = None
     jumps: Jumps | None = Field(None, description="of the target, in an escort")
-    trouble: Trouble | None = Field(None, description="what goes wrong, drawn too")
-    scenario: dict[str, JsonValue] = Field({}, description="anything else of the scenarios that are drawn")
+    trouble: Trouble | None = Field(None, description="random disturbances")
+    scenario: dict[str, JsonValue] = Field({}, description="other values of the drawn scenarios")
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        dials: list[tuple[str, Density | Speed | PerVehicle | Count | Distance]] = [
+        scene_parameters: list[tuple[str, Density | Speed | PerVehicle | Count | Distance]] = [
             ("density", self.density),
             ("speed", self.speed),
         ]
@@ -151,15 +151,15 @@ class Scene(Part):
         for name, kind in (("spheres", self.spheres), ("posts", self.posts)):
             if kind is not None:
                 if kind.per_vehicle is not None:
-                    dials.append((f"{name}.per_vehicle", kind.per_vehicle))
+                    scene_parameters.append((f"{name}.per_vehicle", kind.per_vehicle))
                 if kind.count is not None:
                     spans.append((f"{name}.count", kind.count))
                 spans += [(f"{name}.radius", kind.radius), (f"{name}.height", kind.height)]
         if self.jumps is not None:
-            dials += [("jumps.count", self.jumps.count), ("jumps.length", self.jumps.length)]
+            scene_parameters += [("jumps.count", self.jumps.count), ("jumps.length", self.jumps.length)]
             if self.jumps.every_s.hard > self.jumps.every_s.easy:
                 raise ValueError("jumps.every_s: hard must not be longer than easy")
-        for name, dial in dials:
+        for name, dial in scene_parameters:
             if dial.hard < dial.easy:
                 raise ValueError(f"{name}: hard must not be less than easy")
         for name, span in spans:

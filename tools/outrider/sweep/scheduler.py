@@ -50,7 +50,7 @@ def connected(address: str) -> Any:
     )
 
 
-def _check_alike(client: Any, address: str) -> None:
+def _check_version(client: Any, address: str) -> None:
     """Raise InputError if the scheduler's version of Dask differs from the one here."""
     there = client.sync(client.scheduler.versions, callback_timeout=CONNECT_S)
     theirs, ours = there["packages"]["distributed"], version_of("distributed")
@@ -92,7 +92,7 @@ def _connect(address: str, ended: list[Any]) -> None:
         ended.append(error)
         return
     try:
-        _check_alike(client, address)
+        _check_version(client, address)
     except Exception as error:
         client.close()  # type: ignore[no-untyped-call]
         ended.append(error)

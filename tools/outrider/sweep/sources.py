@@ -21,7 +21,7 @@ _OTHERS = ("outrider", "numpy", "scipy", "numba", "piqp", "jsbsim", "filterpy", 
 
 
 def versions() -> dict[str, str]:
-    """Return everything besides the task that results depend on."""
+    """Return the versions of Python, machine, code and packages; besides the task, results depend on them."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     found["code"] = digest(sources())
     for package in _OTHERS:

@@ -2,9 +2,8 @@
 
 Rates: Wilson's score interval (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927). Quantiles: order statistics; two
 values of the sample enclose the true quantile with a probability that the binomial distribution gives (H. A.
-David and H. N. Nagaraja, Order Statistics, 3rd ed., Sec. 7.1). Both are exact functions of the sample: no
-random numbers are drawn, so the same runs give the same intervals. Values may be +inf: a run that never
-converged took longer than every run that did.
+David and H. N. Nagaraja, Order Statistics, 3rd ed., Sec. 7.1). No random numbers are drawn, so the same runs
+give the same intervals. Values may be +inf: a run that never converged took longer than every run that did.
 """
 
 from __future__ import annotations

@@ -31,15 +31,19 @@ class Trouble(Part):
     jitter_ms: tuple[Milliseconds, Milliseconds] = (0.0, 0.0)
     duplication: tuple[Share, Share] = (0.0, 0.0)
     reordering: tuple[Share, Share] = (0.0, 0.0)
-    wind: Annotated[float, Field(ge=0.0, le=20.0)] = Field(0.0, description="m/s at most, from anywhere")
-    clock_ms: Milliseconds = Field(1.0, description="each clock differs by so much at most")
-    fitting_epochs: Share = Field(
-        0.75, description="how often a certified fleet's epoch is long enough for its links"
+    wind: Annotated[float, Field(ge=0.0, le=20.0)] = Field(
+        0.0, description="largest speed, m/s; any direction"
     )
-    partitions: tuple[Few, Few] = Field((0, 0), description="how often the swarm is cut in two")
+    clock_ms: Milliseconds = Field(1.0, description="largest offset of a clock")
+    fitting_epochs: Share = Field(
+        0.75, description="probability that certified.epoch_us is set to at least delay + jitter"
+    )
+    partitions: tuple[Few, Few] = Field((0, 0), description="how often the swarm is divided in two")
     freezes: tuple[Few, Few] = Field((0, 0), description="how many companions hang for a while")
     vanishes: tuple[Few, Few] = Field((0, 0), description="how many companions vanish for good")
-    within_s: Seconds = Field(8.0, description="all of it begins so long after the goal event at most")
+    within_s: Seconds = Field(
+        8.0, description="latest start of a fault after the goal event; longest pause before a partition"
+    )
     for_s: tuple[Seconds, Seconds] = (0.5, 4.0)
 
     @model_validator(mode="after")
@@ -66,7 +70,7 @@ def strike(trouble: Trouble, count: int, random: np.random.Generator) -> dict[st
     document: dict[str, JsonValue] = {"sensors": str(random.choice(trouble.sensors))}
     loss, delay_ms, jitter_ms = (bad(span) for span in (trouble.loss, trouble.delay_ms, trouble.jitter_ms))
     if trouble.fitting_epochs > random.uniform():
-        # A sensible configuration: the epoch is not shorter than the time in which a plan arrives.
+        # The epoch is then at least the largest delay of a plan that is neither lost nor reordered.
         epochs = max(int(np.ceil((delay_ms + jitter_ms) / (1e-3 * _KNOT_US))), 1)
         document["companion"] = {"certified": {"epoch_us": _KNOT_US * epochs}}
     document["links"] = {

@@ -14,7 +14,7 @@ def say(line: str) -> None:
     try:
         room = select.select([], [sys.stderr], [], 0)[1]
     except (OSError, ValueError):
-        room = [sys.stderr]  # not a file of the system
+        room = [sys.stderr]  # not a file descriptor that select accepts
     if room:
         sys.stderr.write(f"{line}\n")
         sys.stderr.flush()

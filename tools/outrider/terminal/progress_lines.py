@@ -10,9 +10,9 @@ LINE_S = 20.0
 
 
 class ProgressLines:
-    """Progress lines that begin after ``LINE_S`` seconds and end once the reader is gone.
+    """Progress lines at intervals of at least ``LINE_S`` seconds, the first after the first interval.
 
-    Work that ends sooner needs no progress.
+    No more lines are written once standard error has failed.
     """
 
     def __init__(self) -> None:

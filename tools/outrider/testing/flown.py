@@ -109,8 +109,8 @@ class Flown:
 class Replayed(Setpoints):
     """Set-points that a companion would have sent to a log's vehicle.
 
-    ``sent``: those that were sent to it; ``reasons``: steps of 10 ms without a set-point, by what was
-    missing.
+    ``sent``: those that were sent to it; ``reasons``: number of 10 ms steps without a set-point, by the
+    missing input.
     """
 
     def __init__(self, name: str, found: ShadowRun, golden: Golden) -> None:

@@ -25,10 +25,10 @@ _NAMES = (
 )
 _UNITS = (*("m",) * 3, *("m/s",) * 3, *("m/s²",) * 3, "rad", "", "")
 _YAW, _ACCELERATIONS = 9, slice(6, 9)
-_JOLT = 10.0
-"""Factor on the tolerance of accelerations, in which noise shows first."""
+_ACCELERATION_FACTOR = 10.0
+"""Factor on the tolerance of accelerations, which are the noisiest values."""
 _DIGITS = 4
-_EVERY = 1_000
+_TIME_UNIT_US = 1_000
 """Resolution of times (µs): they are stored in milliseconds."""
 
 
@@ -72,7 +72,7 @@ def table(of: Course) -> np.ndarray:
 
     Columns: ms since the first, position, velocity and acceleration NED, yaw, mask and frame.
     """
-    since = (of.times - (of.times[0] if len(of.times) else 0)) // _EVERY
+    since = (of.times - (of.times[0] if len(of.times) else 0)) // _TIME_UNIT_US
     last = np.column_stack([of.yaw, of.masks, of.frames])
     columns = [since[:, None], of.positions, of.velocities, of.accelerations, last]
     result: np.ndarray = np.round(np.hstack(columns).astype(np.float64), _DIGITS)
@@ -117,7 +117,7 @@ def difference(golden: np.ndarray, found: np.ndarray, within: float) -> str:
     off = np.abs(found[:count, 1:] - golden[:count, 1:])
     # Yaw differences wrap around; a value that is NaN in both is no difference.
     off[:, _YAW] = np.abs((off[:, _YAW] + np.pi) % (2.0 * np.pi) - np.pi)
-    off[:, _ACCELERATIONS] /= _JOLT
+    off[:, _ACCELERATIONS] /= _ACCELERATION_FACTOR
     neither = np.isnan(found[:count, 1:]) & np.isnan(golden[:count, 1:])
     off = np.where(neither, 0.0, np.where(np.isnan(off), np.inf, off))
     wrong = off > within
@@ -135,7 +135,7 @@ def difference(golden: np.ndarray, found: np.ndarray, within: float) -> str:
 
 
 def _place(golden: np.ndarray, found: np.ndarray, off: np.ndarray, row: int, column: int) -> str:
-    apart = off[row, column] * (_JOLT if column in range(9)[_ACCELERATIONS] else 1.0)
+    apart = off[row, column] * (_ACCELERATION_FACTOR if column in range(9)[_ACCELERATIONS] else 1.0)
     now, before, unit = found[row, column + 1], golden[row, column + 1], _UNITS[column]
     values = f"{_NAMES[column]} {now:.4g} {unit}, golden {before:.4g} {unit}"
     return f"{found[row, 0] * 1e-3:.2f} s after the first: {values}, {apart:.4f} {unit} apart"

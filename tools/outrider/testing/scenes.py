@@ -69,7 +69,7 @@ def changed(name: str, changes: dict[str, Any]) -> Scenario:
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Return ``base`` with ``changes`` merged in, mapping by mapping."""
+    """Return ``base`` with ``changes`` merged in; mappings of the same ``kind`` are merged, too."""
     result = deepcopy(base)
     for key, value in changes.items():
         inner = result.get(key)

@@ -10,7 +10,7 @@ from mavlink_bridge.messages import SetpointLocal
 from outrider.shadow.setpoints import Course, Facts, course, facts, steps
 from outrider.testing.golden import Golden
 
-_MEAN = 1_000_000
+_RATE_WINDOW_US = 1_000_000
 """Interval over which a rate is counted (µs)."""
 
 
@@ -61,7 +61,8 @@ class Setpoints:
     def assert_rate(self, *, at_least: float, gap: float = 0.5) -> None:
         """Assert ``at_least`` set-points in every second, and no pause longer than ``gap`` (s).
 
-        The seconds are counted from the first set-point; an incomplete last one is ignored.
+        The seconds are counted from the first set-point; an incomplete last one is ignored. For less than a
+        second of set-points, ``at_least`` limits their mean rate.
         """
         __tracebackhide__ = True
         times = self.course.times
@@ -77,7 +78,7 @@ class Setpoints:
             )
         if (np.diff(times) < 0).any():
             raise AssertionError(f"{self.name}: the times of the set-points go back")
-        counts = np.bincount((times - times[0]) // _MEAN)[:-1]
+        counts = np.bincount((times - times[0]) // _RATE_WINDOW_US)[:-1]
         whole = (len(times) - 1) / max((times[-1] - times[0]) * 1e-6, 1e-6)
         if not len(counts) and whole < at_least:
             raise AssertionError(f"{self.name}: {whole:.1f} set-points a second; {at_least:g} are asked for")
@@ -88,10 +89,10 @@ class Setpoints:
             )
 
     def assert_golden(self, name: str, *, within: float = 0.01) -> None:
-        """Assert the same set-points, at the same times, as the golden file ``name`` beside the test.
+        """Assert the same set-points, at the same times (ms), as the golden file ``name`` of the test.
 
-        Positions may differ by ``within`` m, velocities by ``within`` m/s, yaw by ``within`` rad. With
-        ``--update-golden`` the file is written instead.
+        Positions may differ by ``within`` m, velocities by ``within`` m/s, yaw by ``within`` rad,
+        accelerations by 10 times ``within`` m/s². With ``--update-golden`` the file is written instead.
         """
         __tracebackhide__ = True
         self._golden.check(name, self.name, self.course, within)

@@ -32,7 +32,7 @@ _ALLOWED: Final = (
     "allowed: a run directory, or endpoints that are listened to: udpin:HOST:PORT, mcast:, tcp:HOST:PORT, "
     "/dev/DEVICE,BAUD, tlog:PATH"
 )
-_EVERY: Final = 0.1
+_PICTURE_PERIOD_S: Final = 0.1
 """Time between two pictures of a recording (s)."""
 
 
@@ -59,7 +59,7 @@ def view(sources: Sequence[str], terms: Terms) -> int:
         return _serve(player, terms, "plays")
     if terms.html is not None:
         raise InputError(
-            f"--html {terms.html}: of what is still going on there is no whole; allowed: a run directory"
+            f"--html {terms.html}: only a finished run can be written to a file; allowed: a run directory"
         )
     with ExitStack() as opened:
         return _serve(_listening(sources, terms, opened), terms, "listens, and sends nothing:")
@@ -129,10 +129,10 @@ def _html(player: Player, watch: Callable[[str, float], None]) -> str:
         begin, end = player.span
         stage.show(player.moment(begin))
         recording = page_server.server.get_scene_serializer()
-        for at in np.arange(begin, end, _EVERY).tolist():
+        for at in np.arange(begin, end, _PICTURE_PERIOD_S).tolist():
             stage.show(player.moment(at))
-            recording.insert_sleep(_EVERY)
-            watch("drawing", (at - begin) / max(end - begin, _EVERY))
+            recording.insert_sleep(_PICTURE_PERIOD_S)
+            watch("drawing", (at - begin) / max(end - begin, _PICTURE_PERIOD_S))
         return recording.as_html()
     finally:
         page_server.stop()

@@ -22,11 +22,11 @@ from outrider.scene.scene import LEAST_REACH, Scene
 from outrider.scene.snapshot import NO_PLAN, Array, Single, Snapshot, State, euler_attitude, padded
 from outrider.scene.view_commands import ViewCommands
 
-LOST, CARRIED, FRESH = 10.0, 0.5, 1.0
+LOST, EXTRAPOLATION_S, FRESH = 10.0, 0.5, 1.0
 """Limits of age (s).
 
-A vehicle without a message for LOST is no longer shown; its position is extrapolated with its velocity for
-CARRIED; attitudes and plans are valid for FRESH.
+A vehicle without a GLOBAL_POSITION_INT for LOST is no longer drawn; its position is extrapolated with its
+velocity for CARRIED; attitudes and plans are valid for FRESH.
 """
 PICTURE, NEW_SCENE = 0.04, 1.0
 """Shortest time (s) between two snapshots, and between two scenes."""
@@ -53,7 +53,7 @@ class _Received:
 
     def __init__(self, fix: _Fix) -> None:
         self.fix = fix
-        self.leant = -np.inf
+        self.attitude_times = -np.inf
         self.attitude: Array | None = None
         self.planned = -np.inf
         self.plan: Single = NO_PLAN
@@ -129,7 +129,7 @@ class Listener:
         if received is None:
             return
         if isinstance(message, Attitude):
-            received.leant = wall
+            received.attitude_times = wall
             received.attitude = euler_attitude(message.roll, message.pitch, message.yaw)
         elif isinstance(message, Heartbeat):
             if component == mavlink.MAV_COMP_ID_AUTOPILOT1:
@@ -203,16 +203,16 @@ class Listener:
 
 
 def _carried(fix: _Fix, wall: float) -> Array:
-    """Return the extrapolated position (3,); NaN if nothing has been received for more than LOST."""
+    """Return the extrapolated position (3,); NaN if the last position is older than LOST."""
     age = wall - fix.at
     if age > LOST:
         return np.full(3, np.nan)
-    place: Array = fix.place + min(age, CARRIED) * fix.velocity
+    place: Array = fix.place + min(age, EXTRAPOLATION_S) * fix.velocity
     return place
 
 
 def _turned(received: _Received, wall: float) -> Array:
-    if received.attitude is not None and wall - received.leant < FRESH:
+    if received.attitude is not None and wall - received.attitude_times < FRESH:
         return received.attitude
     half = 0.5 * (received.fix.yaw or 0.0)
     return np.array([np.cos(half), 0.0, 0.0, np.sin(half)])

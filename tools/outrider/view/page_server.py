@@ -17,7 +17,7 @@ from outrider.view.source import Source
 
 PICTURE = 1.0 / 30.0
 """Shortest time (s) between two pictures."""
-_SAY = 0.3
+_COMMAND_PERIOD_S = 0.3
 """Period (s) at which view commands are repeated."""
 
 
@@ -39,7 +39,7 @@ class PageServer:
                 self.server = Server(host=host, port=port, verbose=False)
         here = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::", "::1") else host
         self.url = f"http://{here}:{self.server.get_port()}"
-        self.server.gui.add_markdown("Nothing has come yet.")
+        self.server.gui.add_markdown("No data has been received yet.")
         self._stage: Renderer | None = None
         self._panel: Panel | None = None
 
@@ -56,7 +56,7 @@ class PageServer:
                 sought, panel.sought = panel.sought, None
                 if panel.commands != last_commands:
                     panel.head()
-                if sought is not None or panel.commands != last_commands or wall - said > _SAY:
+                if sought is not None or panel.commands != last_commands or wall - said > _COMMAND_PERIOD_S:
                     said, last_commands = wall, panel.commands
                     source.command(panel.commands, sought)
             time.sleep(max(PICTURE - (time.monotonic() - wall), 0.005))

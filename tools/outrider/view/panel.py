@@ -28,7 +28,7 @@ _MOST_ROWS = 64
 class Panel:
     """Panel for ``stage`` on ``server``.
 
-    ``begin`` holds the initial view commands and ``wishes`` the current ones. ``sought`` is the time (s)
+    ``begin`` holds the initial view commands and ``commands`` the current ones. ``sought`` is the time (s)
     chosen at the slider; the loop that plays a run takes it.
     """
 
@@ -47,7 +47,6 @@ class Panel:
         self._speed: viser.GuiDropdownHandle[str] | None = None
         self.sought: float | None = None
         self._series: deque[tuple[float, float]] = deque()
-        self._thin = 0
         self._next_table = self._next_plot = 0.0
         gui, scene = server.gui, stage.scene
         gui.set_panel_label(scene.title)
@@ -95,7 +94,6 @@ class Panel:
         """Add a point to the plot. A time before the last one clears the plot."""
         if self._series and moment.time < self._series[-1][0]:
             self._series.clear()
-            self._thin = 0
         distance = nearest(moment.position).distance
         self._series.append((moment.time, distance if isfinite(distance) else np.nan))
         if len(self._series) > 2 * POINTS:
@@ -200,7 +198,7 @@ class Panel:
     _target_height = 0.0
 
     def notice(self, moment: Snapshot) -> None:
-        """Store the height of the target: a click moves the target at this height."""
+        """Store the height of the target, which a click does not change."""
         if np.isfinite(moment.target).all():
             self._target_height = float(moment.target[2])
 

@@ -46,7 +46,7 @@ class Player:
         self.hint = ""
         self._spent = [_of(plan_times, system) for system in scene.systems]
         self._commands = self.begin
-        # Before that the vehicles only take off.
+        # Playing starts 1 s before the goal event: until then the vehicles only take off.
         self._at = min(max(self.span[0], -1.0), self.span[1])
         self._wall: float | None = None
         self._sent: float | None = None

@@ -12,7 +12,7 @@ import sys
 from outrider.scene.datagram_channel import DatagramChannel
 from outrider.view.live import LiveSource, Ready
 
-_GENTLE = 10
+_NICE = 10
 """Nice value: flying processes have priority."""
 
 
@@ -24,7 +24,7 @@ def main(descriptor: int, host: str, port: int) -> None:
     parent = os.getppid()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(OSError):
-        os.nice(_GENTLE)
+        os.nice(_NICE)
     line = DatagramChannel(socket.socket(fileno=descriptor))
     try:
         from outrider.view.page_server import PageServer

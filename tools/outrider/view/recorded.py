@@ -30,22 +30,22 @@ _DECODED = {
     mavlink.MAVLINK_MSG_ID_TUNNEL,
 }
 _SWARM, _AUTOPILOT = names.LINK_NUMBERS["swarm"], names.LINK_NUMBERS["autopilot"]
-_OFTEN = 4096
+_PROGRESS_RECORDS = 4096
 
 
 class Record(NamedTuple):
     """Log data of one vehicle, by its own clock (Unix µs, rising).
 
-    ``epochs`` belong to ``plans`` (KNOTS, 6), ``leant`` to the attitudes (4,), FLU in ENU, and ``beaten`` to
-    the heartbeats; attitudes and heartbeats are those of its autopilot. ``heard`` has the times of the
-    positions received from each other vehicle.
+    ``epochs`` belong to ``plans`` (KNOTS, 6), ``attitude_times`` to the attitudes (4,), FLU in ENU, and
+    ``heartbeat_times`` to the heartbeats; attitudes and heartbeats are those of its autopilot. ``received``
+    has the times of the positions received from each other vehicle.
     """
 
     epochs: list[int]
     plans: list[Single]
-    leant: list[int]
+    attitude_times: list[int]
     attitudes: list[Array]
-    beaten: list[int]
+    heartbeat_times: list[int]
     beats: list[Heartbeat]
     received: dict[int, list[int]]
 
@@ -66,12 +66,12 @@ class Record(NamedTuple):
 
     def attitude(self, now: int) -> Array | None:
         """Return the attitude reported at ``now`` (µs) or shortly before; None if there is none."""
-        index = bisect_right(self.leant, now) - 1
-        return None if index < 0 or now - self.leant[index] > FRESH else self.attitudes[index]
+        index = bisect_right(self.attitude_times, now) - 1
+        return None if index < 0 or now - self.attitude_times[index] > FRESH else self.attitudes[index]
 
     def _beat(self, now: int) -> Heartbeat | None:
-        index = bisect_right(self.beaten, now) - 1
-        return None if index < 0 or now - self.beaten[index] > HEARTBEAT_LOST else self.beats[index]
+        index = bisect_right(self.heartbeat_times, now) - 1
+        return None if index < 0 or now - self.heartbeat_times[index] > HEARTBEAT_LOST else self.beats[index]
 
     def age(self, now: int) -> float:
         """Return the largest time (s) since the last position of another vehicle; NaN before the first."""
@@ -90,7 +90,7 @@ def record(path: Path, owner: int, at: Callable[[int], None] = lambda _bytes: No
     try:
         for number, one in enumerate(read_tlog(path)):
             size += 8 + len(one.frame)
-            if number % _OFTEN == 0:
+            if number % _PROGRESS_RECORDS == 0:
                 at(size)
             if one.link in (_SWARM, _AUTOPILOT):
                 for message in codec.feed(one.frame, whole=True):
@@ -108,13 +108,17 @@ def record(path: Path, owner: int, at: Callable[[int], None] = lambda _bytes: No
 def _take(found: Record, owner: int, time: int, link: int, message: Message) -> None:
     system = message.source.system
     if isinstance(message, Attitude):
-        if system == owner and link == _AUTOPILOT and (not found.leant or time >= found.leant[-1]):
-            found.leant.append(time)
+        if (
+            system == owner
+            and link == _AUTOPILOT
+            and (not found.attitude_times or time >= found.attitude_times[-1])
+        ):
+            found.attitude_times.append(time)
             found.attitudes.append(euler_attitude(message.roll, message.pitch, message.yaw))
     elif isinstance(message, Heartbeat):
         own = message.source == Source(owner, mavlink.MAV_COMP_ID_AUTOPILOT1) and link == _AUTOPILOT
-        if own and (not found.beaten or time >= found.beaten[-1]):
-            found.beaten.append(time)
+        if own and (not found.heartbeat_times or time >= found.heartbeat_times[-1]):
+            found.heartbeat_times.append(time)
             found.beats.append(message)
     elif isinstance(message, GlobalPosition):
         if system != owner and link == _SWARM:

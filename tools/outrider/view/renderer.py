@@ -19,10 +19,10 @@ WORLD = "/world"
 AZIMUTH, ELEVATION, FIELD = -1.15, 0.5, np.radians(40.0)
 """Initial view direction, as in the report, and field of view (rad)."""
 _AWAY = (0.0, 0.0, -1e4)
-_LARGER, _SHARE = 3.0, 0.09
-"""Drawn size of a vehicle: this share of the visible range, but at most this multiple of the span."""
+_MAX_SIZE_FACTOR, _SIZE_SHARE = 3.0, 0.09
+"""Largest drawn size of a vehicle as a multiple of its span, and its usual size as a share of the reach."""
 _TARGET = rgb("#17202a")
-_UNTURNED = (1.0, 0.0, 0.0, 0.0)
+_IDENTITY = (1.0, 0.0, 0.0, 0.0)
 _NO_LINE = np.zeros((1, 2, 3))
 
 
@@ -71,7 +71,7 @@ class Renderer:
         self._planes = stage.add_batched_meshes_simple(
             f"{WORLD}/planes",
             *shapes.tile(),
-            batched_wxyzs=np.tile(_UNTURNED, (MOST, 1)),
+            batched_wxyzs=np.tile(_IDENTITY, (MOST, 1)),
             batched_positions=np.tile(_AWAY, (MOST, 1)),
             batched_scales=np.full(MOST, 0.15 * scene.reach),
             batched_colors=linear(ACCENT),
@@ -127,7 +127,7 @@ class Renderer:
             self._trails.see(one.time, one.position)
         there = np.asarray(np.isfinite(moment.position).all(axis=1))
         place = np.where(there[:, None], moment.position, _AWAY).astype(np.float32)
-        attitude = np.where(np.isfinite(moment.attitude), moment.attitude, _UNTURNED).astype(np.float32)
+        attitude = np.where(np.isfinite(moment.attitude), moment.attitude, _IDENTITY).astype(np.float32)
         for handle in (self._rotors, self._frames):
             handle.batched_positions, handle.batched_wxyzs = place, attitude
         for handle in (self._shells, self._reach):
@@ -173,7 +173,7 @@ class Renderer:
         return self._stage.add_batched_meshes_simple(
             f"{WORLD}/{name}",
             *mesh,
-            batched_wxyzs=np.tile(_UNTURNED, (count, 1)),
+            batched_wxyzs=np.tile(_IDENTITY, (count, 1)),
             batched_positions=np.tile(_AWAY, (count, 1)),
             batched_scales=np.full(count, scale),
             batched_colors=paint,
@@ -272,13 +272,13 @@ class Renderer:
 
 def _drawn(scene: Scene) -> float:
     """Return the size (m) at which a vehicle is drawn."""
-    return float(min(max(scene.span, _SHARE * scene.reach), _LARGER * scene.span))
+    return float(min(max(scene.span, _SIZE_SHARE * scene.reach), _MAX_SIZE_FACTOR * scene.span))
 
 
 def _pool(found: Plane) -> tuple[Single, Single]:
     """Return positions (MOST, 3) and attitudes (MOST, 4) of the planes; unused planes are far away."""
     place = np.tile(np.array(_AWAY, np.float32), (MOST, 1))
-    turned = np.tile(np.array(_UNTURNED, np.float32), (MOST, 1))
+    turned = np.tile(np.array(_IDENTITY, np.float32), (MOST, 1))
     count = len(found.middle)
     place[:count], turned[:count] = found.middle, facing(found.normal)
     return place, turned

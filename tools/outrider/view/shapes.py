@@ -1,4 +1,4 @@
-"""Meshes of about one metre: vertices (V, 3) and faces (F, 3)."""
+"""Meshes of vehicles, obstacles and marks: vertices (V, 3), m, and faces (F, 3)."""
 
 from __future__ import annotations
 

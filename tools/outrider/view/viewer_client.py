@@ -18,7 +18,7 @@ from outrider.scene.scene import Scene
 from outrider.scene.view_commands import ViewCommands
 from outrider.view.live import Begin, Landed, Ready
 
-_PATIENCE = 60.0
+_START_TIMEOUT_S = 60.0
 """Time (s) that the process has to start."""
 
 
@@ -76,7 +76,7 @@ class ViewerClient:
         self.line.close()
 
     def _ready(self) -> Ready:
-        until = time.monotonic() + _PATIENCE
+        until = time.monotonic() + _START_TIMEOUT_S
         while time.monotonic() < until and self.process.poll() is None:
             for data in self.line.receive():
                 found = pickle.loads(data)

@@ -1,4 +1,4 @@
-"""Translation of pydantic's errors into faults with a place in the text, in the words of the file."""
+"""Translation of pydantic's errors into faults with a position in the text and the file's own key names."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _KEY = "[key]"
 class _Place(NamedTuple):
     """The place to which an error's location leads.
 
-    ``path`` names it as the file does; ``parent`` is the schema of what contains it. The fault is reported at
-    ``at``, its key is at ``holder_at``; ``absent`` is the key or index that the tree lacks.
+    ``path``: keys and indices in the file; ``parent``: schema of the containing value; ``at`` and
+    ``holder_at``: positions of the value and of its key; ``absent``: key or index that the tree lacks.
     """
 
     path: tuple[str | int, ...]
@@ -55,7 +55,7 @@ class _OfUnion(NamedTuple):
 
     @property
     def of_whole(self) -> bool:
-        """Whether the value does not even resemble this member."""
+        """Whether the error is about the value as a whole: its kind is not that of this member."""
         return len(self.error["loc"]) <= self.union.depth + 1 and self.error["type"] not in _OF_A_RULE
 
 
@@ -71,7 +71,7 @@ def _within(path: tuple[str | int, ...]) -> str:
 def model_flaws(tree: Tree, schema: Schema, errors: Iterable[ErrorDetails]) -> list[Flaw]:
     """Return one flaw for each error; the errors of a union give one flaw.
 
-    Places that are broken already are skipped.
+    Errors at ``Broken`` values are skipped, because their faults are reported already.
     """
     placed = [(_locate(tree, schema, error["loc"]), error) for error in errors]
     flaws = []

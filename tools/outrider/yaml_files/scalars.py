@@ -28,7 +28,10 @@ class ScalarError(ValueError):
 
 
 def resolve(text: str) -> Value:
-    """Return the value of a plain scalar; raise ScalarError for NaN, infinities, integers beyond 64 bits."""
+    """Return the value of a plain scalar.
+
+    Raises ScalarError for NaN, infinities, floats out of range, and integers beyond 64 bits.
+    """
     if text in _NULLS:
         return None
     if text in _BOOLEANS:

@@ -102,7 +102,7 @@ def _decode(data: bytes, name: str) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        # The codec without BOM counts positions from behind the mark.
+        # The codec's positions do not include the byte order mark.
         data = data.removeprefix(b"\xef\xbb\xbf")
         before = data[: error.start].decode(errors="replace")
         wrong = f"byte 0x{data[error.start]:02x} is not UTF-8; allowed: text in UTF-8"
