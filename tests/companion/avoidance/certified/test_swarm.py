@@ -71,6 +71,21 @@ def test_who_lacks_a_plan_of_the_epoch_does_not_replan(swarm: Swarm) -> None:
             assert plan == swarm.vehicles[system - 1].plan(made.epoch)
 
 
+@pytest.mark.xfail(strict=True, reason="docs/certified.md: two vehicles are away together, and both return")
+def test_who_was_away_together_with_another_does_not_replan_beside_its_last_plan() -> None:
+    """Each has accepted the other's farewell; the second to return has not heard that the other is back."""
+    rough = Rough(0.0, 0, 0.0, (), mute=((1_300_000, 2_000_000, 1),))
+    habits = [
+        Habits(0, 0, leaves=1_000_000, returns=1_300_000),
+        Habits(0, 0, leaves=1_190_000, returns=1_490_000),
+    ]
+    swarm = Swarm(np.array([[0.0, 0.0, 5.0], [4.0, 0.0, 5.0]]), rough, habits, 0)
+    swarm.run(3_000_000, lambda _since, system: np.array([2.0, 3.0 * system, 5.0]))
+    for made in swarm.made():
+        for system, plan in made.beside.items():
+            assert plan == swarm.vehicles[system - 1].plan(made.epoch)
+
+
 @FLIGHTS
 @given(swarms(leave=True))
 def test_every_plan_follows_from_the_one_before_it(swarm: Swarm) -> None:
