@@ -2,10 +2,11 @@
 
 A vehicle replans in an epoch only if it holds the plan of that very epoch of every member of its coordination
 set, and each of these has this vehicle in its own coordination set (``missing`` is empty). An older plan is
-not enough, because its sender may have made another since. A sender of a plan or a roster is a member from
-then on, and so are the members in its roster. A vehicle that said farewell flies its last plan to the end and
-stays there. A farewell is accepted only if the plan of its epoch is held, because an older plan may end
-elsewhere; and only for as long as such a plan is accepted, because its sender may have joined again since.
+not enough, because its sender may have made another since. A sender of a plan or a roster is a member
+until its farewell, and so are the members in its latest roster. A vehicle that
+said farewell flies its last plan to the end and stays there. A farewell is accepted only if the plan of its
+epoch is held, because an older plan may end elsewhere; and only for as long as such a plan is accepted,
+because its sender may have joined again since.
 """
 
 from __future__ import annotations
@@ -76,7 +77,11 @@ class PeerPlans:
         return self._members
 
     def receive_plan(self, now: int, system: int, payload: bytes) -> None:
-        """Receive a TUNNEL payload of kind plan; refuse and count one that cannot be a committed plan."""
+        """Receive a TUNNEL payload of kind plan.
+
+        Refuses and counts a plan that does not end at rest, has other settings, is too far from ``now`` or
+        differs from the stored plan of its epoch.
+        """
         # Most payloads repeat the last one.
         if system == self._own or self._last.get(system) == payload:
             return
@@ -148,7 +153,8 @@ class PeerPlans:
 
         A peer that accepts the farewell no longer counts this vehicle. So a peer is assumed to count it again
         only after a roster of that peer says so and is too late for the peer to accept the farewell
-        afterwards. A roster goes with a plan that begins at most two epochs later.
+        afterwards: the farewell is accepted for four epochs, a roster's plan begins at most two epochs after
+        it is sent, and one epoch is a margin.
         """
         self._counted.clear()
         self._earliest_counted_epoch = epoch + (_MAX_EPOCHS + 3) * self._epoch
@@ -157,7 +163,8 @@ class PeerPlans:
         """Return the members that keep this vehicle from replanning in ``epoch`` (µs).
 
         The plan of such a member for this epoch is not held, or the member may replan without regard to this
-        vehicle, because it has sent no roster for this epoch or an earlier one that contains this vehicle.
+        vehicle, because none of its rosters for this epoch or an earlier one contains this vehicle, or a
+        later one omits it.
         """
         found = set()
         for system in self.members:

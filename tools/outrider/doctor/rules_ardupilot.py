@@ -30,7 +30,7 @@ def _guided_timeout(value: float, _case: Case) -> Meaning:
 
 def _ground_failsafe(value: float, case: Case) -> Meaning:
     if value == 0:
-        return Meaning(NOTE, "It flies on when the ground station is lost; only the companion reacts.")
+        return Meaning(NOTE, "It flies on when the ground station is lost.")
     station = case.parameter("SYSID_MYGCS")
     there = {one.source.system for one in case.hearing.senders.values() if one.is_ground_station}
     if station is None or station in there:

@@ -69,7 +69,7 @@ def _failures(value: float, _case: Case) -> Meaning:
 
 def _ground_lost(value: float, _case: Case) -> Meaning:
     if value == 0:
-        return Meaning(NOTE, "It flies on when the ground station is lost; only the companion reacts.")
+        return Meaning(NOTE, "It flies on when the ground station is lost.")
     return Meaning(
         NOTE,
         "When the ground station is lost the autopilot acts by itself (hold 1, return 2, land 3, …).",

@@ -1,7 +1,7 @@
 """Scenario drawn from a scene and a seed, the same every time.
 
-Each group of quantities has its own stream of random numbers, so that a change of one group does not redraw
-the others.
+Each group of quantities has its own stream of random numbers, so a change of one group leaves the random
+numbers of the others as they are. Positions that depend on it may still change.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from outrider.sweep.scenes import Scene, Things
 from outrider.sweep.trouble import strike
 
 _MARGIN = 10.0
-"""Margin (m) of the planner's box around all starts, goals and the circle of the escort."""
+"""Horizontal margin (m) of the planner's box around all starts, goals and the circle of the escort."""
 _MIN_RADIUS = 4.0
 """Least radius (m) of the circle around an escorted target; the radius grows with the number of vehicles."""
 
