@@ -24,8 +24,6 @@ BAD_INPUT, FAULT = 2, 3
 _INTERRUPTED = 130
 """Exit status that typer returns for Ctrl-C."""
 _EXTRAS: Final = {
-    "numba": "sitl",
-    "llvmlite": "sitl",
     "jsbsim": "sitl",
     "mcap": "export",
     "pyarrow": "export",

@@ -22,7 +22,7 @@ from companion.avoidance.certified.committed import (
 )
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.qp import Objective, SeparationQp, State
-from companion.avoidance.certified.separating_planes import Others, planes
+from companion.avoidance.certified.separating_planes import Others, along, planes
 from companion.config.certified import CertifiedConfig
 from companion.errors import CertificateError, CompanionError, SolverError
 from companion.values.horizon import Array, Horizon, Motion
@@ -129,7 +129,7 @@ class Commitment:
                 continue
             points = controls(plan)
             # The rounded plan is checked, because the others receive the rounded one.
-            kept = np.einsum("mnk,nik->mni", corridor.normals, points) - corridor.least
+            kept = along(corridor.normals, points) - corridor.least
             if kept.min(initial=np.inf) >= 0.0:
                 push = np.einsum("mni,mnk->k", answer.plane_multipliers, corridor.normals)
                 self._deadlock_turn.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)

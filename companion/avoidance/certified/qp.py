@@ -6,8 +6,9 @@ and adds the field to the acceleration. Here every step is weighted, and the fie
 follow a lasting push with its accelerations. The plan ends at rest.
 
 Bounds of acceleration are bounds on variables. Limits of speed and position and the planes are rows Ga ≥ low.
-A row is in the QP if the committed plan is within ``_NEAR`` of it, or if the best plan without rows or an
-earlier solution violates it. A limit that the committed plan violates is relaxed until the plan satisfies it,
+A row is a candidate if the committed plan is within ``_NEAR`` of it, or if the best plan without rows or an
+earlier solution violates it. The QP holds the candidates that bind (``binding_rows``), and its solution is
+checked against all rows. A limit that the committed plan violates is relaxed until the plan satisfies it,
 so that this plan is feasible in every problem.
 """
 
@@ -18,6 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.avoidance.certified.active_set import binding_rows
+from companion.avoidance.certified.rows import row_bounds, row_columns, row_slacks
 from companion.avoidance.certified.separating_planes import Planes
 from companion.avoidance.solver import solve_once
 from companion.config.certified import CertifiedConfig
@@ -29,6 +32,8 @@ from companion.values.prediction import prediction
 _ROUNDS = 8
 _NEAR = 0.1
 """Distance (m/s, m) of the committed plan within which a row takes part from the first solution on."""
+_KINDS = 18
+"""Number of rows of the limits in each step: speed, second and third control point, three axes, both ways."""
 _TOLERANCE = 1e-5
 """Largest violation of a row (m, m/s) that is accepted; much smaller than the planes' margin."""
 _ROUNDED = 0.01
@@ -85,10 +90,11 @@ class SeparationQp:
     ) -> None:
         n, dt = steps, config.dt_us * 1e-6
         self.n, self._config = n, config
-        self._S_v, self._S_x, _ = prediction(n, dt)
-        v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self._S_v, self._S_x))
+        S_v, self._S_x, _ = prediction(n, dt)
+        self.dt, self.S_v = dt, np.ascontiguousarray(S_v)
+        v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self.S_v, self._S_x))
         # Control point b of segment i, depending on a, (3, n, n), and on time where a = 0, (n, 3).
-        self._maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x])
+        self.maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x])
         self._times: Array = dt * (np.arange(n)[:, None] + np.array([0.0, 0.5, 1.0]))
         self._weights = np.full(n, config.omega_place)
         self._weights[-1] = config.omega_end
@@ -96,15 +102,17 @@ class SeparationQp:
         change = np.eye(n) - np.eye(n, k=-1)
         one = 2.0 * (
             self._S_x.T @ (self._weights[:, None] * self._S_x)
-            + config.omega_speed * self._S_v.T @ self._S_v
+            + config.omega_speed * self.S_v.T @ self.S_v
             + config.omega_input * np.eye(n)
             + config.omega_jerk * change.T @ change
         )
         self._P = np.asfortranarray(np.kron(np.eye(3), one))
-        self._A = np.asfortranarray(np.kron(np.eye(3), self._S_v[-1:]))
+        self._A = np.asfortranarray(np.kron(np.eye(3), self.S_v[-1:]))
         # Inverse of the optimality conditions without rows and bounds: the best plan is then one product.
         conditions = np.block([[self._P, self._A.T], [self._A, np.zeros((3, 3))]])
-        self._without_rows: Array = np.linalg.inv(conditions)[: 3 * n]
+        inverse = np.linalg.inv(conditions)
+        self._without_rows: Array = inverse[: 3 * n]
+        self._inverse: Array = np.ascontiguousarray(inverse[: 3 * n, : 3 * n])
         self.gradient_per_metre = 2.0 * float(self._weights.sum())
         """Cost gradient at a plan that is one metre from all its preferred places."""
         a_max = np.array(limits.u_max) - _ROUNDED
@@ -112,56 +120,54 @@ class SeparationQp:
             # The heights stay almost constant: an interior-point method needs an interior.
             a_max[2] = _ROUNDED
         self._a_max = np.repeat(a_max, n)
-        # Speeds after each step, and control points except the first of each segment, both ways.
-        kron = [np.kron(np.eye(3), part) for part in (self._S_v, self._maps[1], self._maps[2])]
-        self._limits_G: Array = np.vstack([sign * part for part in kron for sign in (1.0, -1.0)])
         v_max, low, high = (
             np.repeat(np.array(bound, dtype=np.float64), n)
             for bound in (limits.v_max, limits.box_min, limits.box_max)
         )
-        self._limits_low: Array = np.concatenate([-v_max, -v_max, low, -high, low, -high])
+        # Speeds after each step, and control points except the first of each segment, both ways.
+        self.limits_low: Array = np.concatenate([-v_max, -v_max, low, -high, low, -high])
 
     def solve(self, state: State, objective: Objective, planes: Planes) -> Answer:
         """Return the best plan from ``state`` that keeps all rows.
 
         Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs.
         """
-        coasting = self._coasting(state.position, state.velocity)
-        c = self._cost(coasting[:, 2], state.velocity, state.before, objective)
-        rows = _Rows(self, coasting, state, planes)
+        c = self._cost(state, objective)
+        rows = _Rows(self, state, planes)
         flown = state.committed.T.ravel()
         a_max = np.maximum(self._a_max, flown)
         a_min = np.minimum(-self._a_max, flown)
         best = self._without_rows @ np.concatenate([-c, -state.velocity])
-        best = np.minimum(np.maximum(best, a_min), a_max).reshape(3, self.n).T
-        active = (rows.values(state.committed) < _NEAR) | (rows.values(best) < 0.0)
+        clipped = np.minimum(np.maximum(best, a_min), a_max).reshape(3, self.n).T
+        candidates = (rows.values(state.committed) < _NEAR) | (rows.values(clipped) < 0.0)
         for count in range(1, _ROUNDS + 1):
-            found = solve_once(self._P, c, self._A, -state.velocity, *rows.chosen(active), a_min, a_max)
+            chosen = np.flatnonzero(candidates)
+            G_T, low = rows.chosen(chosen)
+            binding = np.empty(3 * self.n, np.int64)
+            found_rows = binding_rows(self._inverse, best, G_T, low, a_min, a_max, binding)
+            if found_rows >= 0:
+                binding = np.sort(binding[:found_rows])
+                chosen, G_T, low = chosen[binding], G_T[:, binding], low[binding]
+            found = solve_once(self._P, c, self._A, -state.velocity, G_T.T, low, a_min, a_max)
             a: Array = found.x.reshape(3, self.n).T
             broken = rows.values(a) < -_TOLERANCE
             if not broken.any():
-                return Answer(a, rows.plane_multipliers(active, found.multipliers), count)
-            if not (broken & ~active).any():
+                return Answer(a, rows.plane_multipliers(chosen, found.multipliers), count)
+            if not (broken & ~candidates).any():
                 break
-            active |= broken
+            candidates |= broken
         raise SolverError("rows are broken", count)
 
-    def _coasting(self, position: Array, velocity: Array) -> Array:
-        return position + self._times[:, :, None] * velocity
-
-    def _cost(self, ends: Array, velocity: Array, before: Array, objective: Objective) -> Array:
-        """Return c (3n,).
-
-        ``ends`` (n, 3), m: the ends of the steps without input. ``before`` (3,), m/s²: the acceleration until
-        the plan begins.
-        """
+    def _cost(self, state: State, objective: Objective) -> Array:
+        """Return c (3n,)."""
         config = self._config
+        ends = state.position + self._times[:, 2, None] * state.velocity
         flown = np.zeros_like(objective.field)
-        flown[0] = before
+        flown[0] = state.before
         deviation = self._weights[:, None] * (ends - objective.places) - config.omega_field * objective.field
         c: Array = 2.0 * (
             self._S_x.T @ deviation
-            + config.omega_speed * self._S_v.T @ (velocity - objective.velocities)
+            + config.omega_speed * self.S_v.T @ (state.velocity - objective.velocities)
             - config.omega_jerk * flown
         )
         return c.T.ravel()
@@ -170,41 +176,39 @@ class SeparationQp:
 class _Rows:
     """All rows of one problem: first those of the limits, then those of the planes.
 
-    Rows of planes are written out only where they take part.
+    Rows are written out only where they are candidates.
     """
 
-    def __init__(self, program: SeparationQp, coasting: Array, state: State, planes: Planes) -> None:
+    def __init__(self, program: SeparationQp, state: State, planes: Planes) -> None:
         self._program, self._normals = program, planes.normals
-        n = program.n
-        speeds = np.repeat(state.velocity, n)
-        places = [coasting[:, b].T.ravel() for b in (1, 2)]
-        coasted = np.concatenate([s * part for part in (speeds, *places) for s in (1.0, -1.0)])
-        self._split = len(coasted)
-        wanted = planes.wanted - np.einsum("mnk,nik->mni", planes.normals, coasting)
-        # The first control point is the vehicle's position, which no input changes.
-        wanted[:, 0, 0] = -np.inf
-        self._low: Array = np.concatenate([program._limits_low - coasted, wanted.ravel()])
+        self._split = _KINDS * program.n
+        self._low: Array = np.empty(self._split + planes.normals.size)
+        row_bounds(
+            state.position,
+            state.velocity,
+            program.dt,
+            program.limits_low,
+            self._normals,
+            planes.wanted,
+            self._low,
+        )
         # The planes are made so that the committed plan keeps them.
         self._low[: self._split] -= np.maximum(-self.values(state.committed)[: self._split], 0.0)
 
     def values(self, a: Array) -> Array:
         """Return the slack G a − low of each row, negative if violated; ``a`` (n, 3), m/s²."""
-        moved = np.einsum("bij,jk->ibk", self._program._maps, a)
-        planes = np.einsum("mnk,nik->mni", self._normals, moved)
-        limits = self._program._limits_G @ a.T.ravel()
-        result: Array = np.concatenate([limits, planes.ravel()]) - self._low
-        return result
+        slack = np.empty(len(self._low))
+        row_slacks(np.ascontiguousarray(a), self._program.dt, self._normals, self._low, slack)
+        return slack
 
-    def chosen(self, active: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Return G (R, 3n) and low (R,) of the ``active`` rows."""
-        program, n = self._program, self._program.n
-        m, i, b = np.unravel_index(np.flatnonzero(active[self._split :]), (*self._normals.shape[:2], 3))
-        planes = self._normals[m, i][:, :, None] * program._maps[b, i][:, None, :]
-        G = np.vstack([program._limits_G[active[: self._split]], planes.reshape(-1, 3 * n)])
-        return G, self._low[active]
+    def chosen(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return Gᵀ (3n, R) and low (R,) of the given ``rows`` (R,)."""
+        G_T = np.zeros((3 * self._program.n, len(rows)))
+        row_columns(rows, self._program.S_v, self._program.maps, self._normals, G_T)
+        return G_T, self._low[rows]
 
-    def plane_multipliers(self, active: NDArray[np.bool_], multipliers: Array) -> Array:
-        """Return the multipliers of the planes' rows, (M, n, 3)."""
-        every = np.zeros(len(active))
-        every[active] = multipliers
+    def plane_multipliers(self, rows: NDArray[np.intp], multipliers: Array) -> Array:
+        """Return the multipliers (M, n, 3) of the planes' rows from those of the given ``rows`` (R,)."""
+        every = np.zeros(len(self._low))
+        every[rows] = multipliers
         return every[self._split :].reshape(*self._normals.shape[:2], 3)

@@ -16,11 +16,13 @@ whole margin from the own side.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.values.compiled import BOOL, FLOAT, VOID, array, kernel, output, part
 from companion.values.horizon import Array
 
 _TINY = 1e-12
@@ -56,18 +58,21 @@ def planes(own: Array, others: Others, spare: float, *, upright: bool = False) -
 
     ``spare`` (m) is wanted beyond the least distance. ``upright``: heights do not count.
     """
-    relative = own - others.controls
-    if upright:
-        relative[..., 2] = 0.0
-    normals = nearest(relative.reshape(-1, 3, 3)).reshape((*relative.shape[:2], 3))
-    # (M, n, 3): one value for each control point.
-    gap = np.einsum("mnk,mnik->mni", normals, relative)
-    here = np.einsum("mnk,nik->mni", normals, own)
-    part = np.where(others.shares, 0.5, 1.0)[:, None, None]
-    distance = others.distance[:, :, None]
-    room = part * np.maximum(gap - distance, 0.0)
-    wanted = part * np.maximum(gap - distance - spare, 0.0)
-    return Planes(normals, here - room, here - wanted, room)
+    found = Planes(*(np.empty((*others.distance.shape, 3)) for _ in Planes._fields))
+    # One call of the kernel needs contiguous arrays; those of a flight are.
+    own, controls, distance = map(np.ascontiguousarray, (own, others.controls, others.distance))
+    _planes(own, controls, distance, others.shares, spare, upright, *found)
+    return found
+
+
+def along(normals: Array, points: Array) -> Array:
+    """Return c·q (M, n, 3), m, of control points (n, 3, 3), m, along the ``normals`` (M, n, 3).
+
+    Its rounding is that of ``planes``: the committed plan keeps its planes exactly.
+    """
+    result = np.empty((*normals.shape[:2], 3))
+    _along(normals, np.ascontiguousarray(points), result)
+    return result
 
 
 def nearest(triangles: Array) -> Array:
@@ -76,20 +81,9 @@ def nearest(triangles: Array) -> Array:
     The interior of a flat triangle is of no use: of edges and interior, the one that holds the triangle
     further off counts. A triangle about the origin gets some unit vector: nothing separates it.
     """
-    following = triangles[:, (1, 2, 0)]
-    edges = following - triangles
-    square = np.einsum("kei,kei->ke", edges, edges)
-    share = -np.einsum("kei,kei->ke", triangles, edges) / np.maximum(square, _TINY)
-    points = triangles + np.minimum(np.maximum(share, 0.0), 1.0)[..., None] * edges
-    normal = _cross(edges[:, 0], edges[:, 1])
-    # The normal of the triangle's plane, towards the triangle.
-    normal *= np.where(np.einsum("ki,ki->k", normal, triangles[:, 0]) < 0.0, -1.0, 1.0)[:, None]
-    candidates = _unit(np.concatenate([points, normal[:, None]], axis=1))
-    margins = np.einsum("kci,kvi->kcv", candidates, triangles).min(axis=2)
-    best = margins.argmax(axis=1)
-    result: Array = candidates[np.arange(len(best)), best]
-    result[~result.any(axis=1)] = (1.0, 0.0, 0.0)
-    return result
+    found = np.empty((len(triangles), 3))
+    _nearest_all(np.ascontiguousarray(triangles), found)
+    return found
 
 
 def hull_distance(triangles: Array) -> Array:
@@ -99,19 +93,92 @@ def hull_distance(triangles: Array) -> Array:
     return result
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Return the cross products of rows (k, 3); ``np.cross`` takes several times as long for few rows."""
-    result: Array = a[:, (1, 2, 0)] * b[:, (2, 0, 1)] - a[:, (2, 0, 1)] * b[:, (1, 2, 0)]
-    return result
+@part
+def _dot(a: Array, b: Array) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-def _unit(vectors: Array) -> Array:
-    """Return unit vectors (k, c, 3); near-zero vectors yield zero.
+@part
+def _nearest(triangle: Array, candidate: Array, best: Array) -> None:
+    """Write ``nearest`` of one ``triangle`` (3, 3) to ``best`` (3,); ``candidate`` (3,) is scratch memory.
 
-    A fixed direction instead would win now and then by a rounding error, on one side only.
+    The candidates are the nearest points of the three edges and the normal of the triangle's plane, all of
+    unit length. One that is nearly zero stays zero: a fixed direction instead would win now and then by a
+    rounding error, on one side only.
     """
-    norm = np.sqrt(np.einsum("kci,kci->kc", vectors, vectors))
-    short = norm < _TINY
-    result: Array = vectors / np.where(short, 1.0, norm)[..., None]
-    result[short] = 0.0
-    return result
+    furthest = -np.inf
+    best[:] = 0.0
+    for which in range(4):
+        start, end, after = triangle[which % 3], triangle[(which + 1) % 3], triangle[(which + 2) % 3]
+        if which < 3:
+            square = shadow = 0.0
+            for i in range(3):
+                square += (end[i] - start[i]) * (end[i] - start[i])
+                shadow -= start[i] * (end[i] - start[i])
+            share = min(max(shadow / max(square, _TINY), 0.0), 1.0)
+            for i in range(3):
+                candidate[i] = start[i] + share * (end[i] - start[i])
+        else:
+            for i in range(3):
+                j, k = (i + 1) % 3, (i + 2) % 3
+                candidate[i] = (end[j] - start[j]) * (after[k] - end[k]) - (end[k] - start[k]) * (
+                    after[j] - end[j]
+                )
+            if _dot(candidate, start) < 0.0:
+                candidate *= -1.0
+        norm = sqrt(_dot(candidate, candidate))
+        candidate /= norm if norm >= _TINY else np.inf
+        margin = min(_dot(candidate, triangle[0]), _dot(candidate, triangle[1]), _dot(candidate, triangle[2]))
+        if margin > furthest:
+            furthest = margin
+            best[:] = candidate
+    if best[0] == 0.0 and best[1] == 0.0 and best[2] == 0.0:
+        best[0] = 1.0
+
+
+@kernel(VOID, array(3), output(2))
+def _nearest_all(triangles: Array, normals: Array) -> None:
+    candidate = np.empty(3)
+    for k in range(len(triangles)):
+        _nearest(triangles[k], candidate, normals[k])
+
+
+@kernel(VOID, array(3), array(4), array(2), array(1, BOOL), FLOAT, BOOL, *[output(3)] * 4)
+def _planes(
+    own: Array,
+    controls: Array,
+    distance: Array,
+    shares: NDArray[np.bool_],
+    spare: float,
+    upright: bool,
+    normals: Array,
+    least: Array,
+    wanted: Array,
+    room: Array,
+) -> None:
+    """Write the planes of the module's docstring to the last four arrays."""
+    relative, candidate = np.empty((3, 3)), np.empty(3)
+    for m in range(len(controls)):
+        half = 0.5 if shares[m] else 1.0
+        for n in range(len(own)):
+            for i in range(3):
+                for k in range(3):
+                    relative[i, k] = own[n, i, k] - controls[m, n, i, k]
+                if upright:
+                    relative[i, 2] = 0.0
+            c = normals[m, n]
+            _nearest(relative, candidate, c)
+            for i in range(3):
+                here = _dot(c, own[n, i])
+                gap = _dot(c, relative[i]) - distance[m, n]
+                room[m, n, i] = half * max(gap, 0.0)
+                least[m, n, i] = here - room[m, n, i]
+                wanted[m, n, i] = here - half * max(gap - spare, 0.0)
+
+
+@kernel(VOID, array(3), array(3), output(3))
+def _along(normals: Array, points: Array, result: Array) -> None:
+    for m in range(len(normals)):
+        for n in range(len(points)):
+            for i in range(3):
+                result[m, n, i] = _dot(normals[m, n], points[n, i])

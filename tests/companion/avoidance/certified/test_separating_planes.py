@@ -12,7 +12,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.separating_planes import Others, Planes, hull_distance, nearest, planes
+from companion.avoidance.certified.separating_planes import (
+    Others,
+    Planes,
+    along,
+    hull_distance,
+    nearest,
+    planes,
+)
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.plans import STEPS, curves, later, random_plan
 
@@ -166,13 +173,14 @@ class Pair:
 def test_the_committed_plans_keep_to_their_sides(seed: int, upright: bool) -> None:
     pair = Pair(seed, upright=upright)
     for p, own in zip(pair.planes, pair.points, strict=True):
-        along = np.einsum("mnk,nik->mni", p.normals, own)
+        here = along(p.normals, own)
+        np.testing.assert_allclose(here, np.einsum("mnk,nik->mni", p.normals, own), rtol=0.0, atol=1e-12)
         assert p.room.min() >= 0.0
-        assert (along >= p.least).all()
-        assert (along >= p.wanted).all()
+        assert (here >= p.least).all()
+        assert (here >= p.wanted).all()
         assert (p.wanted >= p.least).all()
         assert (p.wanted <= p.least + SPARE + 1e-12).all()
-        np.testing.assert_allclose(along - p.least, p.room, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(here - p.least, p.room, rtol=0.0, atol=1e-12)
     if upright:
         # Where nothing separates them any direction is as good.
         assert not pair.planes[0].normals[0, pair.apart_now, 2].any()

@@ -1,0 +1,51 @@
+"""Compilation of the planner's arithmetic by numba: double precision, no fast-math, no reassociation.
+
+A kernel is compiled for fixed argument types when its module is imported, and its machine code is kept on
+disk, so nothing is compiled in flight. A part is inlined into the kernels of its module that call it. Numba
+monitors only the file of a stored kernel: a kernel and its parts are in the same file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+from numba import types
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+FLOAT, BOOL, INT, VOID = types.float64, types.boolean, types.int64, types.void
+"""Types of scalars and results."""
+
+
+def array(dimensions: int, of: Any = FLOAT) -> Any:
+    """Return the type of an input array; it may be read-only, and a vector need not be contiguous."""
+    return types.Array(of, dimensions, "A" if dimensions == 1 else "C", readonly=True)
+
+
+def output(dimensions: int, of: Any = FLOAT) -> Any:
+    """Return the type of an array that a kernel writes; it is contiguous."""
+    return types.Array(of, dimensions, "C")
+
+
+def kernel(result: Any, *arguments: Any) -> Callable[[_F], _F]:
+    """Compile a function for these types; a division by zero gives inf or NaN as in NumPy.
+
+    An argument of another type is a TypeError. The machine code is stored if numba finds a directory for it.
+    A read-only system without a home directory has none, and compiles at each start.
+    """
+    signature = result(*arguments)
+
+    def compiled(function: _F) -> _F:
+        try:
+            return cast(_F, numba.njit(signature, error_model="numpy", cache=True)(function))
+        except RuntimeError:
+            return cast(_F, numba.njit(signature, error_model="numpy")(function))
+
+    return compiled
+
+
+def part(function: _F) -> _F:
+    """Compile a function as a part of the kernels that call it."""
+    return cast(_F, numba.njit(error_model="numpy", forceinline=True)(function))
