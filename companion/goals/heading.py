@@ -8,6 +8,7 @@ and acceleration.
 
 from __future__ import annotations
 
+from math import atan2, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from companion.avoidance.solver import QpSolver
 from companion.config.planning import HeadingConfig, HorizonConfig
 from companion.errors import SolverError
+from companion.values.compiled import FLOAT, array, kernel, output
 from companion.values.horizon import Array
 from companion.values.prediction import prediction
 
@@ -58,17 +60,21 @@ class Heading:
         Both are given at n = 1…N + 1. If the QP has no solution, the last yaw plan is kept.
         """
         state = self.at(now)
-        last = _STRIDE * self._n
-        offset = targets[_STRIDE - 1 : last : _STRIDE] - positions[_STRIDE - 1 : last : _STRIDE]
-        bearings = np.arctan2(offset[:, 1], offset[:, 0])
-        # Straight above or below the target its bearing is undefined: the present yaw takes its place.
-        blind = np.abs(offset[:, :2]).max(axis=1) < self._config.blind
-        if blind.any():
-            bearings[blind] = state.yaw
-        free = state.yaw + self._ahead * state.rate
-        c = self._S_x.T @ (2.0 * (free - _unwrapped(state.yaw, bearings)))
+        c, free = np.empty(self._n), np.empty(self._n)
+        largest = _yaw_vectors(
+            state.yaw,
+            state.rate,
+            np.ascontiguousarray(positions),
+            np.ascontiguousarray(targets),
+            self._config.blind,
+            self._dt,
+            self._S_x,
+            self._minimiser,
+            c,
+            free,
+        )
         try:
-            self._accelerations = self._solve(c, state.rate)
+            self._accelerations = self._solve(c, free, largest, state.rate)
         except SolverError:
             return
         self._start, self._state = now, state
@@ -90,13 +96,14 @@ class Heading:
         acceleration = float(a[index])
         return Yaw(yaw + s * rate + 0.5 * s * s * acceleration, rate + s * acceleration, acceleration)
 
-    def _solve(self, c: Array, rate: float) -> Array:
-        """Return the unconstrained minimiser (n,) where it surely keeps all bounds, else PIQP's solution."""
+    def _solve(self, c: Array, free: Array, largest: float, rate: float) -> Array:
+        """Return the ``free`` minimiser (n,) where it surely keeps all bounds, else PIQP's solution.
+
+        ``largest`` is its largest absolute acceleration, rad/s².
+        """
         limit, bound = self._limit, self._config.rate_max
-        a: Array = self._minimiser @ c
-        largest = float(np.abs(a).max())
         if largest <= limit[0] and abs(rate) + largest * float(self._ahead[-1]) <= bound:
-            return a
+            return free
         if abs(rate) + self._max_rate_change <= bound:
             return self._bounded.solve(c, -limit, limit)
         # A present rate above the bound must be allowed, otherwise there is no solution.
@@ -104,10 +111,45 @@ class Heading:
         return self._limited.solve(c, -limit, limit, -rows - rate, rows - rate)
 
 
-def _unwrapped(start: float, angles: Array) -> Array:
-    """Return the angles (n,) without jumps of 2π, beginning with the turn nearest to ``start``."""
-    steps = np.empty_like(angles)
-    steps[0] = angles[0] - start
-    np.subtract(angles[1:], angles[:-1], out=steps[1:])
-    steps -= (2.0 * np.pi) * np.round(steps * (0.5 / np.pi))
-    return start + np.cumsum(steps)
+@kernel(FLOAT, FLOAT, FLOAT, array(2), array(2), FLOAT, FLOAT, array(2), array(2), output(1), output(1))
+def _yaw_vectors(
+    yaw: float,
+    rate: float,
+    positions: Array,
+    targets: Array,
+    blind: float,
+    dt: float,
+    S_x: Array,
+    minimiser: Array,
+    c: Array,
+    free: Array,
+) -> float:
+    """Write c (n,) of the QP and its free minimiser (n,), −P⁻¹c; return the largest absolute entry of that.
+
+    The bearings of the ``targets`` from the ``positions`` have no jumps of 2π, and begin with the turn
+    nearest to ``yaw``.
+    """
+    n = len(c)
+    missing = np.empty(n)
+    before = wanted = yaw
+    for k in range(n):
+        row = _STRIDE * (k + 1) - 1
+        east, north = targets[row, 0] - positions[row, 0], targets[row, 1] - positions[row, 1]
+        # Straight above or below the target its bearing is undefined: the present yaw takes its place.
+        bearing = yaw if max(abs(east), abs(north)) < blind else atan2(north, east)
+        step = bearing - before
+        before = bearing
+        wanted += step - 2.0 * pi * np.round(step * (0.5 / pi))
+        missing[k] = 2.0 * (yaw + (k + 1) * dt * rate - wanted)
+    for k in range(n):
+        c[k] = 0.0
+        for row in range(n):
+            c[k] += S_x[row, k] * missing[row]
+    largest = 0.0
+    for k in range(n):
+        free[k] = 0.0
+        for m in range(n):
+            free[k] += minimiser[k, m] * c[m]
+        if not abs(free[k]) <= largest:
+            largest = abs(free[k])
+    return largest

@@ -24,6 +24,7 @@ from companion.obstacles.reachable_ball import Ball, flown_on
 from companion.obstacles.relevance_filter import Ages, RelevanceFilter
 from companion.obstacles.trusted_peers import TrustedPeers
 from companion.obstacles.uncertainty import ReportedUncertainty
+from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, output
 from companion.values.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.values.obstacles import Obstacles
 from companion.values.vectors import limit
@@ -93,8 +94,9 @@ class Neighbours:
         self._received: dict[int, int] = {}
         self._arrivals = np.zeros(0, dtype=np.int64)
         self._clocks: dict[int, PlanClock] = {}
-        self._fading = fading(config)
-        self._max_plan_deviation = _MAX_PLAN_DEVIATION if self._fading is None else config.guard.tube
+        left = fading(config)
+        self._fading: Array = np.zeros(0) if left is None else np.ascontiguousarray(left[:, 0])
+        self._max_plan_deviation = _MAX_PLAN_DEVIATION if left is None else config.guard.tube
         self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
         margin = config.field.margin(2)
         self._margin: Array = np.full(_SYSTEM_IDS, margin)
@@ -247,49 +249,36 @@ class Neighbours:
                 age, states, times, since = age[near], states[near], times[near], since[near]
         if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
-        carried = np.minimum(np.maximum(age, 0), config.neighbour.extrapolate_us) * 1e-6
-        here = states[:, 0:3] + carried[:, None] * states[:, 3:6]
-        further = np.zeros(len(ids))
         positions, trusted = self._table.positions(ids, now, now - stale)
-        begins, silent = positions[:, 0], age > stale
+        here, silent = np.empty((len(ids), 3)), age > stale
+        _extrapolate(states, age, config.neighbour.extrapolate_us, here)
+        count, deviation = len(ids), self._max_plan_deviation
+        further: Array | None = None
         if silent.any():
             # Late: a message has arrived recently, but its date is old. A neighbour that has just fallen
             # silent is not late.
-            late = silent & (since <= stale - config.neighbour.delay_us)
-            beside = late & (
-                _within(begins, states[:, 0:3], self._max_plan_deviation)
-                | _within(begins, here, self._max_plan_deviation)
-            )
+            begins, late = positions[:, 0], silent & (since <= stale - config.neighbour.delay_us)
+            beside = late & (_within(begins, states[:, 0:3], deviation) | _within(begins, here, deviation))
             held = silent if config.guard.flown_on_us else late
             if held.any():
-                names = tuple(compress(ids, held.tolist()))
+                names, further = tuple(compress(ids, held.tolist())), np.zeros(count)
                 here[held], further[held] = self._held(
                     names, states[held], times[held], age[held], late[held]
                 )
-            trusted &= beside | (~late & _within(begins, here, self._max_plan_deviation))
-        else:
-            trusted &= _within(begins, here, self._max_plan_deviation)
-        if self._fading is not None:
-            # A vehicle beside its plan is assumed to return to it exponentially.
-            positions += np.where(trusted & ~silent, 1.0, 0.0)[:, None, None] * (
-                self._fading * (here - begins)[:, None, :]
-            )
-        if not trusted.all():
-            lost = ~trusted
-            positions[lost] = here[lost][:, None]
-            if config.neighbour_prediction == "velocity":
-                # A neighbour that is silent for longer than it is extrapolated rests where the extrapolation
-                # ended.
-                moving = lost & (age <= config.neighbour.extrapolate_us)
-                ahead = 1e-6 * config.horizon.dt_us * np.arange(steps)
-                positions[moving] += ahead[:, None] * states[moving, None, 3:6]
-        count = len(ids)
+            trusted &= beside | (~late & _within(begins, here, deviation))
+            deviation = inf
+        # A neighbour that is silent for longer than it is extrapolated rests where the extrapolation ended.
+        moves = config.neighbour_prediction == "velocity"
+        most, step = config.neighbour.extrapolate_us if moves else -1, 1e-6 * config.horizon.dt_us
+        _align(states, age, here, silent, deviation, self._fading, step, most, positions, trusted)
         found = Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count], self._margin[:count])
-        further[trusted] = 0.0
+        if further is not None:
+            further[trusted] = 0.0
         if doubtful:
             # Plans, too, begin at the neighbour's own estimate of its position.
-            further += self._uncertainty.radii(ids)
-        if not further.any():
+            radii = self._uncertainty.radii(ids)
+            further = radii if further is None else further + radii
+        if further is None or not further.any():
             return found
         return found._replace(
             d_min=found.d_min + further, d_safe=found.d_safe + further, radius=found.radius + further
@@ -386,3 +375,65 @@ def _within(planned: Array, places: Array, strayed: float) -> NDArray[np.bool_]:
     """Return which (M,) of the ``planned`` places (M, 3) are within ``strayed`` (m) of ``places`` (M, 3)."""
     off = planned - places
     return np.asarray(np.vecdot(off, off) <= strayed**2)
+
+
+@kernel(VOID, array(2), array(1, INT), INT, output(2))
+def _extrapolate(states: Array, ages: Ages, most: int, here: Array) -> None:
+    """Write to ``here`` (M, 3) the present positions by the last ``states`` (M, 6), ``ages`` (M,) µs old.
+
+    They move at constant velocity for ``most`` µs and then rest.
+    """
+    for j in range(len(states)):
+        carried = 1e-6 * min(max(ages[j], 0), most)
+        for i in range(3):
+            here[j, i] = states[j, i] + carried * states[j, 3 + i]
+
+
+@kernel(
+    VOID,
+    array(2),
+    array(1, INT),
+    array(2),
+    array(1, BOOL),
+    FLOAT,
+    array(1),
+    FLOAT,
+    INT,
+    output(3),
+    output(1, BOOL),
+)
+def _align(
+    states: Array,
+    ages: Ages,
+    here: Array,
+    silent: NDArray[np.bool_],
+    deviation: float,
+    fading: Array,
+    step: float,
+    most: int,
+    positions: Array,
+    trusted: NDArray[np.bool_],
+) -> None:
+    """Replace planned ``positions`` (M, N + 1, 3) of neighbours by measured ones where plans do not count.
+
+    A plan is no longer ``trusted`` (M,) if it is further than ``deviation`` (m) from the measured place
+    ``here`` (M, 3). A vehicle beside a trusted plan returns to it by the shares ``fading`` (N + 1,);
+    an empty one stands for none. Without a trusted plan a neighbour rests; if its state is at most ``most``
+    (µs) old, it moves on at constant velocity, with ``step`` (s) between positions.
+    """
+    off = np.empty(3)
+    for j in range(len(positions)):
+        square = 0.0
+        for i in range(3):
+            off[i] = here[j, i] - positions[j, 0, i]
+            square += off[i] * off[i]
+        trusted[j] = trusted[j] and square <= deviation * deviation
+        moves = ages[j] <= most
+        for n in range(positions.shape[1]):
+            for i in range(3):
+                if not trusted[j]:
+                    positions[j, n, i] = here[j, i]
+                    if moves:
+                        positions[j, n, i] += n * step * states[j, 3 + i]
+                elif not silent[j] and len(fading):
+                    positions[j, n, i] += fading[n] * off[i]

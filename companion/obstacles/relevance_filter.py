@@ -25,7 +25,7 @@ bearings.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,18 @@ from companion.config import CompanionConfig
 from companion.config.planning import FADING, MethodName
 from companion.estimation.tracks import State
 from companion.obstacles.reachable_ball import further, norms
+from companion.values.compiled import (
+    BOOL,
+    FLOAT,
+    INT,
+    VOID,
+    array,
+    elementwise,
+    kernel,
+    output,
+    part,
+    several,
+)
 from companion.values.horizon import Array
 
 Ages = NDArray[np.int64]
@@ -68,6 +80,15 @@ class RelevanceFilter:
         )
         self._stale = config.guard.plan_stale_us
         self._closing = 2.0 * self._max_speed
+        field, band = config.field, config.tangential
+        self._reach_terms = (
+            field.d_safe + field.margin(2),
+            0.0 if field.braking is None else 0.5 / field.braking,
+            0.0 if field.braking is None else field.reaction,
+            band.d_band,
+            band.reach_s,
+            config.approach_angle.reach + FADING,
+        )
         self._relevant_distance = float(self._reach(self._closing)) + self._closing * self._horizon_s
         self._landing_distance = config.guard.landing_clearance + config.field.margin(2)
         self._use_all = False
@@ -125,27 +146,89 @@ class RelevanceFilter:
         bound with S = P = 0 of one of the places, and those so near horizontally that a vehicle which lands
         at a place might descend onto them.
         """
-        off = states[:, None, 0:3] - places
-        distance = norms(off).min(axis=1)
-        near: NDArray[np.bool_] = (distance <= self._relevant_distance) | self._use_all
-        if near.all():
+        near = np.ones(len(states), dtype=np.bool_)
+        if self._use_all:
             return near
-        closing = self._max_speed + np.maximum(norms(states[:, 3:6]), self._max_speed)
-        drift = 1e-6 * np.clip(ages, 0, self._extrapolate_us) * (closing - self._max_speed)
-        drift += self._acceleration_drift * (ages > self._stale)
-        near = distance <= self._reach(closing) + closing * self._horizon_s + drift + _MAX_PLAN_OFFSET
-        below = norms(off[:, :, 0:2]).min(axis=1) <= self._landing_distance + drift + _MAX_PLAN_OFFSET
-        return np.asarray(near | below)
+        _near(
+            np.ascontiguousarray(places),
+            states,
+            ages,
+            self._relevant_distance,
+            self._landing_distance,
+            self._max_speed,
+            self._horizon_s,
+            self._extrapolate_us,
+            self._stale,
+            self._acceleration_drift,
+            self._reach_terms,
+            near,
+        )
+        return near
 
     def _reach(self, closing: Array | float) -> Array:
         """Return the distance (m, between centres) within which one vehicle affects the plan of the other.
 
         ``closing`` (m/s): their closing speed.
         """
-        config = self._config
-        field, band = config.field, config.tangential
-        braking = np.zeros_like(closing)
-        if field.braking is not None:
-            braking = np.square(closing) / (2.0 * field.braking) + field.reaction * closing
-        reach = field.d_safe + field.margin(2) + np.maximum(braking, band.d_band + band.reach_s * closing)
-        return np.asarray(np.maximum(reach, config.approach_angle.reach + FADING), dtype=np.float64)
+        result: Array = _reaches(np.asarray(closing, dtype=np.float64), *self._reach_terms)
+        return result
+
+
+def _reach(
+    closing: float, d_safe: float, slowing: float, reaction: float, band: float, reach_s: float, least: float
+) -> float:
+    """Return ``RelevanceFilter._reach`` at the speed ``closing`` (m/s).
+
+    ``slowing`` is 1/(2 a_rel), s²/m; the others are the settings of the field, the band and the angles, m and
+    s.
+    """
+    braking = closing * (closing * slowing + reaction)
+    return max(d_safe + max(braking, band + reach_s * closing), least)
+
+
+_reach_of = part(_reach)
+_reaches = elementwise(7)(_reach)
+
+
+@kernel(
+    VOID,
+    array(2),
+    array(2),
+    array(1, INT),
+    *[FLOAT] * 4,
+    INT,
+    INT,
+    FLOAT,
+    several(6),
+    output(1, BOOL),
+)
+def _near(
+    places: Array,
+    states: Array,
+    ages: Ages,
+    certain: float,
+    below: float,
+    max_speed: float,
+    horizon_s: float,
+    extrapolate_us: int,
+    stale: int,
+    acceleration_drift: float,
+    terms: tuple[float, float, float, float, float, float],
+    near: NDArray[np.bool_],
+) -> None:
+    """Write ``RelevanceFilter.near`` to ``near`` (M,); others within ``certain`` (m) are near."""
+    for j in range(len(states)):
+        least, flat = np.inf, np.inf
+        for p in range(len(places)):
+            x, y, z = states[j, 0] - places[p, 0], states[j, 1] - places[p, 1], states[j, 2] - places[p, 2]
+            flat = min(flat, sqrt(x * x + y * y))
+            least = min(least, sqrt(x * x + y * y + z * z))
+        if least <= certain:
+            continue
+        x, y, z = states[j, 3], states[j, 4], states[j, 5]
+        closing = max_speed + max(sqrt(x * x + y * y + z * z), max_speed)
+        drift = 1e-6 * min(max(ages[j], 0), extrapolate_us) * (closing - max_speed) + _MAX_PLAN_OFFSET
+        if ages[j] > stale:
+            drift += acceleration_drift
+        reach = _reach_of(closing, *terms)
+        near[j] = least <= reach + closing * horizon_s + drift or flat <= below + drift

@@ -24,6 +24,11 @@ def array(dimensions: int, of: Any = FLOAT) -> Any:
     return types.Array(of, dimensions, "A" if dimensions == 1 else "C", readonly=True)
 
 
+def several(count: int, of: Any = FLOAT) -> Any:
+    """Return the type of a tuple of ``count`` numbers."""
+    return cast(Any, types.UniTuple)(of, count)
+
+
 def output(dimensions: int, of: Any = FLOAT) -> Any:
     """Return the type of an array that a kernel writes; it is contiguous."""
     return types.Array(of, dimensions, "C")
@@ -49,3 +54,16 @@ def kernel(result: Any, *arguments: Any) -> Callable[[_F], _F]:
 def part(function: _F) -> _F:
     """Compile a function as a part of the kernels that call it."""
     return cast(_F, numba.njit(error_model="numpy", forceinline=True)(function))
+
+
+def elementwise(arguments: int) -> Callable[[Callable[..., float]], Callable[..., Any]]:
+    """Compile a function of ``arguments`` numbers, to be applied to arrays that broadcast."""
+    signature, vectorize = FLOAT(*[FLOAT] * arguments), cast(Any, numba.vectorize)
+
+    def compiled(function: Callable[..., float]) -> Callable[..., Any]:
+        try:
+            return cast(Callable[..., Any], vectorize([signature], cache=True)(function))
+        except RuntimeError:
+            return cast(Callable[..., Any], vectorize([signature])(function))
+
+    return compiled

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.values.prediction import prediction
+from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, output, part
 
 Array = NDArray[np.float64]
 
@@ -53,34 +53,58 @@ class Horizon(NamedTuple):
         return Motion(p + s * (v + (0.5 * s) * a), v + s * a, a)
 
     def positions(self, start: int, steps: int, dt: int) -> Array:
-        """Return positions (steps, 3), m, at ``start + n·dt``, n = 0…steps − 1.
-
-        ``start`` (µs) must not lie before the first knot; ``steps`` is at most 64.
-        """
-        elapsed = (start - self.epoch) + dt * _COUNT[:steps]
-        index = np.minimum(elapsed // self.dt, len(self.knots) - 1)
-        s = ((elapsed - index * self.dt) * 1e-6)[:, None]
-        chosen = self.knots[index]
-        result: Array = chosen[:, 0:3] + s * (chosen[:, 3:6] + (0.5 * s) * chosen[:, 6:9])
-        return result
+        """Return positions (steps, 3), m, at ``start + n·dt`` (µs), n = 0…steps − 1."""
+        found = np.empty((steps, 3))
+        _positions(self.knots, start - self.epoch, dt, self.dt, found)
+        return found
 
 
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
-_COUNT = np.arange(64)
 _NO_PLAN_US = 1 << 62
 
 
 def roll_out(epoch: int, dt: int, position: Array, velocity: Array, accelerations: Array) -> Horizon:
     """Return the horizon from a state and accelerations (n, 3): the A and B of the paper, eq. (8)."""
-    n = len(accelerations)
-    S_v, S_x, time = prediction(n, dt * 1e-6)
-    knots = np.zeros((n + 1, 9))
-    knots[0, 0:3], knots[0, 3:6] = position, velocity
-    knots[1:, 0:3] = S_x @ accelerations + position + np.multiply.outer(time, velocity)
-    knots[1:, 3:6] = S_v @ accelerations + velocity
-    knots[:n, 6:9] = accelerations
+    knots = np.empty((len(accelerations) + 1, 9))
+    _roll_out(dt * 1e-6, position, velocity, np.ascontiguousarray(accelerations), knots)
     return Horizon(epoch, dt, knots)
+
+
+@kernel(VOID, FLOAT, array(1), array(1), array(2), output(2))
+def _roll_out(dt: float, position: Array, velocity: Array, accelerations: Array, knots: Array) -> None:
+    """Write the knots (n + 1, 9) of the double integrator, eq. (8), with steps of ``dt`` (s)."""
+    n = len(accelerations)
+    for i in range(3):
+        x, v = position[i], velocity[i]
+        for k in range(n):
+            a = accelerations[k, i]
+            knots[k, i], knots[k, 3 + i], knots[k, 6 + i] = x, v, a
+            x += dt * (v + 0.5 * dt * a)
+            v += dt * a
+        knots[n, i], knots[n, 3 + i], knots[n, 6 + i] = x, v, 0.0
+
+
+@part
+def _positions_of(knots: Array, last: int, elapsed: int, step: int, dt: int, found: Array) -> None:
+    """Write the positions (m, 3) of knots 0…``last``, ``dt`` (µs) apart.
+
+    They are those at ``elapsed`` (µs) after the first knot and every ``step`` (µs) from then on.
+    """
+    for n in range(len(found)):
+        time = elapsed + n * step
+        k = min(max(time // dt, 0), last)
+        s = (time - k * dt) * 1e-6
+        # Before its first knot a horizon has no acceleration.
+        half = 0.5 * max(s, 0.0)
+        for i in range(3):
+            found[n, i] = knots[k, i] + s * (knots[k, 3 + i] + half * knots[k, 6 + i])
+
+
+@kernel(VOID, array(2), INT, INT, INT, output(2))
+def _positions(knots: Array, elapsed: int, step: int, dt: int, found: Array) -> None:
+    """Write ``_positions_of`` a whole horizon."""
+    _positions_of(knots, len(knots) - 1, elapsed, step, dt, found)
 
 
 class Located(NamedTuple):
@@ -113,7 +137,6 @@ class HorizonTable:
         self._knots = np.zeros((0, 1, 9))
         self._latest: dict[int, Horizon] = {}
         self._fresh: set[int] = set()
-        self._ahead = dt * np.arange(steps)
 
     def put(self, sender: int, horizon: Horizon) -> None:
         """Store ``horizon`` unless one of the same sender with a later epoch is known."""
@@ -151,11 +174,12 @@ class HorizonTable:
         The mask is true for horizons whose epoch is ``oldest`` (µs) or later; the other rows are undefined.
         """
         rows = self._rows_of(senders)
-        if not self._rows:
-            return np.zeros((len(senders), self._steps, 3)), np.zeros(len(senders), dtype=np.bool_)
-        epochs = self._epochs[rows]
-        known: NDArray[np.bool_] = (rows >= 0) & (epochs >= oldest)
-        return self._sampled(rows, (start - epochs)[:, None] + self._ahead), known
+        known = np.zeros(len(senders), dtype=np.bool_)
+        positions = np.zeros((len(senders), self._steps, 3))
+        if self._rows:
+            times = np.full(len(senders), start)
+            self._sample(rows, times, oldest, positions, known)
+        return positions, known
 
     def at(self, senders: Sequence[int], times: NDArray[np.int64]) -> Located:
         """Return the planned position of each of ``senders`` (M,) at the corresponding ``times`` (M,), µs."""
@@ -163,9 +187,10 @@ class HorizonTable:
         if not self._rows:
             none = np.full(len(senders), _NO_PLAN_US)
             return Located(np.zeros((len(senders), 3)), none, np.zeros_like(none))
-        after = times - self._epochs[rows]
-        positions = self._sampled(rows, after[:, None])[:, 0]
-        return Located(positions, np.where(rows >= 0, after, _NO_PLAN_US), self._dts[rows])
+        positions, known = np.zeros((len(senders), 1, 3)), np.zeros(len(senders), dtype=np.bool_)
+        self._sample(rows, times, -_NO_PLAN_US, positions, known)
+        after = np.where(known, times - self._epochs[rows], _NO_PLAN_US)
+        return Located(positions[:, 0], after, self._dts[rows])
 
     def accelerations(self, senders: Sequence[int], times: NDArray[np.int64]) -> Array:
         """Return the planned accelerations (M, 3), m/s², of ``senders`` (M,).
@@ -178,7 +203,8 @@ class HorizonTable:
         if not self._rows:
             return np.zeros((len(senders), 3))
         elapsed = times - self._epochs[rows]
-        planned: Array = self._knots[rows, self._segments(rows, elapsed[:, None])[:, 0], 6:9]
+        segments = np.clip(elapsed // self._dts[rows], 0, self._lasts[rows])
+        planned: Array = self._knots[rows, segments, 6:9]
         return np.where((rows >= 0)[:, None], planned, 0.0)
 
     def _rows_of(self, senders: Sequence[int]) -> NDArray[np.int64]:
@@ -187,23 +213,52 @@ class HorizonTable:
             self._update_rows()
         return np.array([self._rows.get(sender, -1) for sender in senders], dtype=np.int64)
 
-    def _segments(self, rows: NDArray[np.int64], elapsed: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the segments (M, n) at these times; the first one before a plan, the last knot after it."""
-        index = elapsed // self._dts[rows][:, None]
-        np.maximum(index, 0, out=index)
-        np.minimum(index, self._lasts[rows][:, None], out=index)
-        return index
+    def _sample(
+        self,
+        rows: NDArray[np.int64],
+        times: NDArray[np.int64],
+        oldest: int,
+        positions: Array,
+        known: NDArray[np.bool_],
+    ) -> None:
+        """Write positions (M, n, 3), m, of ``rows`` (M,) at ``times`` (M,), µs, and each ``dt`` from then on.
 
-    def _sampled(self, rows: NDArray[np.int64], elapsed: NDArray[np.int64]) -> Array:
-        """Return positions (M, n, 3), m, of ``rows`` (M,) at ``elapsed`` (M, n), µs, after their epochs."""
-        index = self._segments(rows, elapsed)
-        s = ((elapsed - index * self._dts[rows][:, None]) * 1e-6)[:, :, None]
-        # One index into one long table is twice as fast as two indices.
-        count = self._knots.shape[1]
-        chosen = self._knots.reshape(-1, 9).take(index + (rows * count)[:, None], axis=0, mode="wrap")
-        # Before its first knot a horizon has no acceleration.
-        result: Array = chosen[:, :, 6:9] * (0.5 * np.maximum(s, 0.0))
-        result += chosen[:, :, 3:6]
-        result *= s
-        result += chosen[:, :, 0:3]
-        return result
+        ``known`` (M,) becomes true for horizons whose epoch is ``oldest`` (µs) or later.
+        """
+        _sample(
+            self._knots,
+            self._epochs,
+            self._dts,
+            self._lasts,
+            rows,
+            times,
+            self._dt,
+            oldest,
+            positions,
+            known,
+        )
+
+
+@kernel(VOID, array(3), *[array(1, INT)] * 5, INT, INT, output(3), output(1, BOOL))
+def _sample(
+    knots: Array,
+    epochs: NDArray[np.int64],
+    dts: NDArray[np.int64],
+    lasts: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    times: NDArray[np.int64],
+    step: int,
+    oldest: int,
+    positions: Array,
+    known: NDArray[np.bool_],
+) -> None:
+    """Write ``HorizonTable._sample``.
+
+    The rows of ``knots`` (S, k, 9) have ``lasts`` + 1 knots, ``dts`` (µs) apart. ``step`` (µs) is
+    the time between two of the positions (M, n, 3).
+    """
+    for j in range(len(rows)):
+        row = rows[j]
+        known[j] = row >= 0 and epochs[row] >= oldest
+        if row >= 0:
+            _positions_of(knots[row], lasts[row], times[j] - epochs[row], step, dts[row], positions[j])

@@ -80,7 +80,7 @@ class Telemetry:
         self.next_due = _NEVER
 
     def start(self, now: int) -> None:
-        """Make every stream due at ``now`` (µs), and from then on at whole intervals."""
+        """Make every stream that has an interval due at ``now`` (µs), and from then on once per interval."""
         for stream in self._streams.values():
             stream.due = now if stream.interval else _NEVER
         self._gather()

@@ -13,7 +13,7 @@ from sitl.vehicle.pipeline import COMMAND_SIZE, advance
 from sitl.vehicle.simd import LANES
 
 _MIN_BLOCK_VEHICLES = 3
-"""Number of vehicles from which on a block is faster than single rows, although its other lanes are idle."""
+"""Number of vehicles from which on a block is faster than single rows; its other lanes hold copies."""
 
 
 @kernel
@@ -35,7 +35,7 @@ def read_block(rows: FloatArray, first: int, block: FloatArray) -> None:
 
 @kernel
 def first_not_finite(rows: FloatArray) -> int:
-    """Return the index of the first row with a value that is not finite, or −1."""
+    """Return the index of the first row whose sum is not finite, or −1."""
     for k in range(rows.shape[0]):
         if not np.isfinite(np.sum(rows[k])):
             return k
@@ -119,8 +119,8 @@ def advance_rows(
 
     ``airframes`` (1,) is the record, ``tracks`` (K, 3 steps) receives the positions after each step. The
     function changes states and tracks in place and returns −1; or it returns the index of a command row that
-    is not finite, and changes nothing. All arrays are C-contiguous float64. The motion of a vehicle depends
-    neither on the others nor on whether it is in a block, so the faster way is chosen.
+    is not finite, and changes nothing. The other arrays are C-contiguous float64. The motion of a vehicle
+    depends neither on the others nor on whether it is in a block, so the faster way is chosen.
     """
     count = len(states)
     rest = count % LANES

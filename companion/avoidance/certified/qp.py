@@ -140,22 +140,25 @@ class SeparationQp:
         best = self._without_rows @ np.concatenate([-c, -state.velocity])
         clipped = np.minimum(np.maximum(best, a_min), a_max).reshape(3, self.n).T
         candidates = (rows.values(state.committed) < _NEAR) | (rows.values(clipped) < 0.0)
+        # A row that does not quite bind may be broken by the solver's error: then the solver gets it, too.
+        given = np.zeros(len(candidates), dtype=np.bool_)
         for count in range(1, _ROUNDS + 1):
             chosen = np.flatnonzero(candidates)
             G_T, low = rows.chosen(chosen)
             binding = np.empty(3 * self.n, np.int64)
             found_rows = binding_rows(self._inverse, best, G_T, low, a_min, a_max, binding)
             if found_rows >= 0:
-                binding = np.sort(binding[:found_rows])
+                binding = np.union1d(binding[:found_rows], np.flatnonzero(given[chosen]))
                 chosen, G_T, low = chosen[binding], G_T[:, binding], low[binding]
             found = solve_once(self._P, c, self._A, -state.velocity, G_T.T, low, a_min, a_max)
             a: Array = found.x.reshape(3, self.n).T
             broken = rows.values(a) < -_TOLERANCE
             if not broken.any():
                 return Answer(a, rows.plane_multipliers(chosen, found.multipliers), count)
-            if not (broken & ~candidates).any():
+            if not (broken & ~given).any():
                 break
             candidates |= broken
+            given |= broken
         raise SolverError("rows are broken", count)
 
     def _cost(self, state: State, objective: Objective) -> Array:

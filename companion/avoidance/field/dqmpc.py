@@ -16,6 +16,7 @@ solution. With ``j_max`` the jerk is bounded, too (``jerk``).
 from __future__ import annotations
 
 from functools import lru_cache
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from companion.avoidance.field.jerk import Flown, JerkRows
 from companion.avoidance.solver import QpSolver
 from companion.config.planning import CostConfig, HorizonConfig, LimitsConfig
 from companion.errors import SolverError
+from companion.values.compiled import FLOAT, INT, VOID, array, kernel, output
 from companion.values.horizon import Array
 from companion.values.prediction import prediction
 
@@ -97,14 +99,12 @@ class Dqmpc:
         dt = horizon.dt_us * 1e-6
         self.n, self.dt, self.cost, self.limits = n, dt, cost, limits
         self._horizon_s = n * dt
-        self.S_v, self.S_x, self._time = prediction(n, dt)
+        self.S_v, self.S_x, _ = prediction(n, dt)
         self.G: Array = np.vstack([self.S_v, self.S_x])
         self._G_T: Array = np.ascontiguousarray(self.G.T)
         self._jerk = None if limits.j_max is None else JerkRows(n, dt, np.array(limits.j_max))
-        self._u = np.array(limits.u_max)[:, None]
-        ones, no = np.ones(n), np.zeros(n)
-        # [v, x] (3, 2) times this gives velocities and positions 1…n without any input (3, 2n).
-        self._drift: Array = np.vstack([np.hstack([ones, self._time]), np.hstack([no, ones])])
+        self._u_max: Array = np.array(limits.u_max)
+        ones = np.ones(n)
         self._low, self._high = (
             np.hstack([np.outer(speed, ones), np.outer(place, ones)])
             for speed, place in (
@@ -115,6 +115,8 @@ class Dqmpc:
         # [x − x̌, v − v̌] at the end (3, 2) times this gives c, for Ω_t as configured.
         weights = 2.0 * np.array([cost.omega_t_position, cost.omega_t_velocity])
         self._pull: Array = weights[:, None] * np.vstack([self.S_x[-1], self.S_v[-1]])
+        self._ratio_i = cost.omega_i / cost.omega_t_position
+        self._ratio_v = cost.omega_t_velocity / cost.omega_t_position
         self._solvers = lru_cache(maxsize=16)(self._build)
 
     def hessian(self, omega_scale: float) -> Array:
@@ -146,22 +148,33 @@ class Dqmpc:
         ``velocity`` (3,). ``flown`` counts where jerk is bounded; without it the plan starts from zero
         acceleration.
         """
-        fT = f.T
-        reach = np.abs(fT) + self._u
-        norm = np.sqrt((reach * reach).sum(axis=0))
-        far = reach * np.minimum(1.0, self.limits.a_total / norm)
-        x_l = np.maximum(fT - self._u, -far)
-        x_u = np.minimum(fT + self._u, far)
-        state = np.empty((3, 2))
-        state[:, 0], state[:, 1] = v, x
-        off = np.empty((3, 2))
-        off[:, 0], off[:, 1] = x + self._horizon_s * v - destination, v - velocity
-        free = state @ self._drift
         if self._jerk is not None and flown is None:
             flown = Flown(np.zeros(3), self.dt)
-        return Problem(
-            (omega_scale * off) @ self._pull, x_l, x_u, self._low - free, self._high - free, far, flown
+        n = self.n
+        found = Problem(
+            np.empty((3, n)),
+            np.empty((3, n)),
+            np.empty((3, n)),
+            np.empty((3, 2 * n)),
+            np.empty((3, 2 * n)),
+            np.empty((3, n)),
+            flown,
         )
+        _vectors(
+            x,
+            v,
+            np.ascontiguousarray(f),
+            destination,
+            velocity,
+            self._u_max,
+            self.limits.a_total,
+            self.dt,
+            omega_scale * self._pull,
+            self._low,
+            self._high,
+            *found[:6],
+        )
+        return found
 
     def reachable(self, problem: Problem) -> Problem:
         """Return the problem with state limits that can be kept.
@@ -208,30 +221,11 @@ class Dqmpc:
         m/s. Without a bound on jerk they are not less than ``least`` (3, n); with one, their changes stay
         within it.
         """
-        dt, found, room = self.dt, np.empty_like(pushed), room - _INSIDE
-        strong = -_SPARE * np.minimum(least[:, -1], 0.0)
-        fastest = self._high[:, 0] - _SLOWER
-        jerk, step, last = None, dt, np.zeros(3)
+        found = np.empty_like(pushed)
+        jerk, step, last = _NO_JERK, self.dt, np.zeros(3)
         if self._jerk is not None and flown is not None:
-            jerk, step, last = np.array(self.limits.j_max), min(flown.elapsed, dt), side * flown.acceleration
-        for n in range(self.n):
-            lost = dt if jerk is None else dt + strong / (2.0 * jerk)
-            stop = np.sqrt(2.0 * strong * np.maximum(room - lost * np.maximum(v, 0.0), 0.0))
-            rest = np.minimum(fastest, stop) - v
-            # A vehicle that moves away from that side too fast must be slowed down first.
-            wanted = np.maximum(pushed[:, n], (-fastest - v) / dt)
-            if jerk is None:
-                a = np.maximum(np.minimum(wanted, rest / dt), least[:, n])
-            else:
-                # v + dt a + a²/2j, the speed when a has come back to zero, stays below.
-                slow = jerk * (np.sqrt(dt * dt + 2.0 * np.maximum(rest, 0.0) / jerk) - dt)
-                back = np.maximum(rest / dt, -np.sqrt(jerk * np.maximum(-rest, 0.0)))
-                a = np.minimum(wanted, np.where(rest > 0.0, slow, back))
-                a = np.minimum(np.maximum(a, last - jerk * step), last + jerk * step)
-                last, step = a, dt
-            found[:, n] = a
-            room = room - dt * (v + 0.5 * dt * a)
-            v = v + dt * a
+            jerk, step, last = self._jerk.j_max, min(flown.elapsed, self.dt), side * flown.acceleration
+        _late(pushed, least, room, v, self._high[:, 0] - _SLOWER, jerk, self.dt, step, last, found)
         return found
 
     def _opened(self, missing: Array, room: Array, margin: Array) -> Array:
@@ -282,37 +276,36 @@ class Dqmpc:
         """
         solvers = self._solvers(omega_scale)
         c, x_l, x_u, h_l, h_u = problem[:5]
-        a: Array = solvers.minimiser @ c.T
-        # Written so that a NaN anywhere fails both comparisons, and reaches a solver that refuses it.
-        inside = ((a >= x_l.T) & (a <= x_u.T)).all(axis=0)
+        a = np.empty((self.n, 3))
+        inside = _free_minimiser(solvers.minimiser, c, x_l, x_u, a)
         relaxed = 0
         if self._jerk is None or problem.flown is None:
-            for i in np.flatnonzero(~inside):
-                a[:, i] = solvers.bounded.solve(c[i], x_l[i], x_u[i])
+            if inside != _ALL:
+                for i in _axes(inside):
+                    a[:, i] = solvers.bounded.solve(c[i], x_l[i], x_u[i])
         else:
             d_l, d_u = self._jerk.bounds(problem.flown)
             change = self._jerk.D @ a
-            inside &= ((change >= d_l.T) & (change <= d_u.T)).all(axis=0)
-            for axis in np.flatnonzero(~inside).tolist():
+            inside &= _as_bits((change >= d_l.T) & (change <= d_u.T))
+            for axis in _axes(inside):
                 a[:, axis], failed = self._bounded(
                     solvers.bounded, self._jerk, problem, axis, d_l[axis], d_u[axis]
                 )
                 relaxed += failed
-        rows = self.G @ a
-        kept: NDArray[np.bool_] = np.all((rows >= h_l.T - _TOLERANCE) & (rows <= h_u.T + _TOLERANCE), axis=0)
-        if not kept.all():
+        kept = _kept(a, self.dt, h_l, h_u)
+        if kept != _ALL:
             opened = self.reachable(problem)
             low, high = self._rows(opened)
-            for i in np.flatnonzero(~kept):
+            for i in _axes(kept):
                 try:
                     a[:, i] = solvers.limited.solve(c[i], opened.x_l[i], opened.x_u[i], low[i], high[i])
                 except SolverError:
                     relaxed += 1
-            x_l = np.where(kept[:, None], x_l, opened.x_l)
-            x_u = np.where(kept[:, None], x_u, opened.x_u)
+            x_l, x_u = x_l.copy(), x_u.copy()
+            x_l[_axes(kept)], x_u[_axes(kept)] = opened.x_l[_axes(kept)], opened.x_u[_axes(kept)]
         if self._jerk is None:
             # PIQP keeps bounds to 1e-8: this clips the rest.
-            np.minimum(np.maximum(a, x_l.T), x_u.T, out=a)
+            _clip(x_l, x_u, a)
         return Solution(a, relaxed)
 
     def _bounded(
@@ -335,12 +328,9 @@ class Dqmpc:
         The paper adds a state gradient and an input gradient; both are taken in position space here, and the
         division makes k_s and k_tang fit any scale of the weights. The gradient vanishes at the destination.
         """
-        w, dt = self.cost, self.dt
-        ratio_v = w.omega_t_velocity / w.omega_t_position
-        e_x, e_v = x_end - destination, v_end - velocity
-        by_input = (w.omega_i / w.omega_t_position) * a[-1] + 0.5 * dt**2 * e_x + ratio_v * dt * e_v
-        gradient: Array = 2.0 * (e_x + by_input)
-        return gradient
+        found = np.empty(3)
+        _gradient(a[-1], x_end, v_end, destination, velocity, self.dt, self._ratio_i, self._ratio_v, found)
+        return found
 
     def _build(self, omega_scale: float) -> _Solvers:
         P = self.hessian(omega_scale)
@@ -349,3 +339,185 @@ class Dqmpc:
             return _Solvers(minimiser, QpSolver(P), QpSolver(P, self.G))
         D = self._jerk.D
         return _Solvers(minimiser, QpSolver(P, D), QpSolver(P, np.vstack([self.G, D])))
+
+
+_NO_JERK = np.zeros(3)
+_NO_JERK.flags.writeable = False
+"""Bounds on jerk that stand for none."""
+_ALL = 0b111
+"""Bits of the three axes."""
+
+
+def _axes(kept: int) -> list[int]:
+    """Return the axes whose bit in ``kept`` is not set."""
+    return [axis for axis in range(3) if not kept >> axis & 1]
+
+
+def _as_bits(kept: NDArray[np.bool_]) -> int:
+    """Return the bits of the axes that are true in all of ``kept`` (n, 3)."""
+    return sum(1 << axis for axis in range(3) if kept[:, axis].all())
+
+
+@kernel(
+    VOID,
+    *[array(1)] * 2,
+    array(2),
+    *[array(1)] * 3,
+    *[FLOAT] * 2,
+    *[array(2)] * 3,
+    *[output(2)] * 6,
+)
+def _vectors(
+    x: Array,
+    v: Array,
+    f: Array,
+    destination: Array,
+    velocity: Array,
+    u_max: Array,
+    a_total: float,
+    dt: float,
+    pull: Array,
+    lowest: Array,
+    highest: Array,
+    c: Array,
+    x_l: Array,
+    x_u: Array,
+    h_l: Array,
+    h_u: Array,
+    far: Array,
+) -> None:
+    """Write the vectors of ``Problem``: c of eq. (2), the bounds of a, (5), and of the states, (6) and (7).
+
+    ``pull`` (2, n) times the errors of position and velocity at the end is c; ``lowest`` and ``highest``
+    (3, 2n) are the limits of velocities and positions.
+    """
+    n = len(f)
+    if len(x) != 3 or len(v) != 3 or len(destination) != 3 or len(velocity) != 3 or c.shape[1] != n:
+        raise ValueError("x, v, destination and velocity have 3 entries, f one row per step")
+    reach = np.empty(3)
+    for k in range(n):
+        square = 0.0
+        for i in range(3):
+            reach[i] = abs(f[k, i]) + u_max[i]
+            square += reach[i] * reach[i]
+        # The box of the inputs is shrunk until its far corner lies in the ball ‖a‖ ≤ a_total.
+        scale = min(1.0, a_total / sqrt(square))
+        for i in range(3):
+            far[i, k] = reach[i] * scale
+            x_l[i, k] = max(f[k, i] - u_max[i], -far[i, k])
+            x_u[i, k] = min(f[k, i] + u_max[i], far[i, k])
+    for i in range(3):
+        off_x, off_v = x[i] + n * dt * v[i] - destination[i], v[i] - velocity[i]
+        for k in range(n):
+            c[i, k] = off_x * pull[0, k] + off_v * pull[1, k]
+            drifted = x[i] + dt * (k + 1) * v[i]
+            h_l[i, k], h_u[i, k] = lowest[i, k] - v[i], highest[i, k] - v[i]
+            h_l[i, n + k], h_u[i, n + k] = lowest[i, n + k] - drifted, highest[i, n + k] - drifted
+
+
+@kernel(INT, array(2), *[array(2)] * 3, output(2))
+def _free_minimiser(minimiser: Array, c: Array, x_l: Array, x_u: Array, a: Array) -> int:
+    """Write −P⁻¹c of each axis to ``a`` (n, 3); return the bits of the axes on which it keeps its bounds.
+
+    A NaN anywhere fails the comparisons, and reaches a solver that refuses it.
+    """
+    n, inside = len(a), 0
+    for i in range(3):
+        keeps = True
+        for k in range(n):
+            value = 0.0
+            for m in range(n):
+                value += minimiser[k, m] * c[i, m]
+            a[k, i] = value
+            keeps = keeps and value >= x_l[i, k] and value <= x_u[i, k]
+        inside |= keeps << i
+    return inside
+
+
+@kernel(INT, array(2), FLOAT, array(2), array(2))
+def _kept(a: Array, dt: float, h_l: Array, h_u: Array) -> int:
+    """Return the bits of the axes whose states, with accelerations ``a`` (n, 3), keep their limits."""
+    n, kept = len(a), 0
+    for i in range(3):
+        x = v = 0.0
+        keeps = True
+        for k in range(n):
+            x += dt * (v + 0.5 * dt * a[k, i])
+            v += dt * a[k, i]
+            keeps = keeps and v >= h_l[i, k] - _TOLERANCE and v <= h_u[i, k] + _TOLERANCE
+            keeps = keeps and x >= h_l[i, n + k] - _TOLERANCE and x <= h_u[i, n + k] + _TOLERANCE
+        kept |= keeps << i
+    return kept
+
+
+@kernel(VOID, array(2), array(2), output(2))
+def _clip(x_l: Array, x_u: Array, a: Array) -> None:
+    """Clip ``a`` (n, 3) to its bounds (3, n)."""
+    for k in range(len(a)):
+        for i in range(3):
+            a[k, i] = min(max(a[k, i], x_l[i, k]), x_u[i, k])
+
+
+@kernel(VOID, *[array(1)] * 5, *[FLOAT] * 3, output(1))
+def _gradient(
+    last: Array,
+    x_end: Array,
+    v_end: Array,
+    destination: Array,
+    velocity: Array,
+    dt: float,
+    ratio_i: float,
+    ratio_v: float,
+    gradient: Array,
+) -> None:
+    """Write ∇J, eq. (11), divided by Ω_t, to ``gradient`` (3,); ``last`` (3,) is a(N).
+
+    ``ratio_i`` and ``ratio_v`` are Ω_i and the Ω_t of the velocity, divided by the Ω_t of the position.
+    """
+    for i in range(3):
+        e_x, e_v = x_end[i] - destination[i], v_end[i] - velocity[i]
+        gradient[i] = 2.0 * (e_x + ratio_i * last[i] + 0.5 * dt * dt * e_x + ratio_v * dt * e_v)
+
+
+@kernel(VOID, *[array(2)] * 2, *[array(1)] * 4, *[FLOAT] * 2, array(1), output(2))
+def _late(
+    pushed: Array,
+    least: Array,
+    room: Array,
+    v: Array,
+    fastest: Array,
+    j_max: Array,
+    dt: float,
+    step: float,
+    last: Array,
+    found: Array,
+) -> None:
+    """Write ``Dqmpc._late`` to ``found`` (3, n).
+
+    ``fastest`` (3,) is the largest speed, m/s; ``j_max`` (3,) is 0 without a bound on jerk, otherwise the
+    plan continues from the acceleration ``last`` (3,) and has ``step`` (s) for its first change.
+    """
+    n = pushed.shape[1]
+    for i in range(3):
+        jerk, flown, allowed = j_max[i], last[i], step
+        place, speed = room[i] - _INSIDE, v[i]
+        strong = -_SPARE * min(least[i, n - 1], 0.0)
+        lost = dt if jerk == 0.0 else dt + strong / (2.0 * jerk)
+        for k in range(n):
+            stop = sqrt(2.0 * strong * max(place - lost * max(speed, 0.0), 0.0))
+            rest = min(fastest[i], stop) - speed
+            # A vehicle that moves away from that side too fast must be slowed down first.
+            a = max(pushed[i, k], (-fastest[i] - speed) / dt)
+            if jerk == 0.0:
+                a = max(min(a, rest / dt), least[i, k])
+            else:
+                # v + dt a + a²/2j, the speed when a has come back to zero, stays below.
+                if rest > 0.0:
+                    a = min(a, jerk * (sqrt(dt * dt + 2.0 * rest / jerk) - dt))
+                else:
+                    a = min(a, max(rest / dt, -sqrt(-jerk * rest)))
+                a = min(max(a, flown - jerk * allowed), flown + jerk * allowed)
+                flown, allowed = a, dt
+            found[i, k] = a
+            place -= dt * (speed + 0.5 * dt * a)
+            speed += dt * a

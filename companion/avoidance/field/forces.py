@@ -19,10 +19,11 @@ paper's field alone.
 
 from __future__ import annotations
 
-from math import pi
+from math import cos, pi, sin, sqrt, tan
 
 import numpy as np
 
+from companion.values.compiled import BOOL, FLOAT, VOID, array, elementwise, kernel, output, part
 from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
 
@@ -30,17 +31,25 @@ _CLOSES = 1.0
 """Closing speed (m/s) from which ``turn`` applies in full."""
 _NEAR = 1e-6
 """Distance (m) below which no direction points away; the force then points along +x."""
+_HALF_TURN = 0.5 * pi
+
+
+def _hyperbolic(distance: float, d_min: float, d_safe: float, gain: float, clamp: float) -> float:
+    """Return F_hyp(d): 0 from d_safe on, continuous and decreasing, and ``clamp`` at and below d_min."""
+    width = d_safe - d_min
+    z = min(max(_HALF_TURN * (distance - d_min) / width, 1e-9), _HALF_TURN)
+    force = min((gain * _HALF_TURN) * (1.0 / tan(z) + z - _HALF_TURN) / width, clamp)
+    return max(force, 0.0)
+
+
+_magnitude = part(_hyperbolic)
+_magnitudes = elementwise(5)(_hyperbolic)
 
 
 def magnitude(distance: Array, d_min: Array, d_safe: Array, gain: float, clamp: float) -> Array:
-    """Return F_hyp(d), m/s²; the shapes broadcast.
-
-    It is 0 from d_safe on, continuous and decreasing, and ``clamp`` at and below d_min.
-    """
-    width = d_safe - d_min
-    z = np.minimum(np.maximum((0.5 * pi) * (distance - d_min) / width, 1e-9), 0.5 * pi)
-    force: Array = np.minimum((gain * 0.5 * pi) * (1.0 / np.tan(z) + z - 0.5 * pi) / width, clamp)
-    return np.maximum(force, 0.0, out=force)
+    """Return F_hyp(d), m/s², eq. (9), of arrays that broadcast."""
+    result: Array = _magnitudes(distance, d_min, d_safe, gain, clamp)
+    return result
 
 
 def repulsion(
@@ -53,61 +62,109 @@ def repulsion(
     reaction: float = 0.0,
     turn: float = 0.0,
 ) -> Array:
-    """Return Σ_j F_rep (N + 1, 3), m/s², on the ``own`` predicted positions (N + 1, 3), m.
+    """Return Σ_j F_rep (N + 1, 3), m/s², eq. (10), on the ``own`` predicted positions (N + 1, 3), m.
 
     Each source is clamped to ``clamp`` m/s². ``braking`` is a_rel (m/s²) of the module's docstring,
     ``reaction`` (s) the time until the vehicle brakes, ``dt`` (s) the step between the predicted positions.
     ``turn`` (rad, counter-clockwise from above) is the rotation of the force of an obstacle that closes at
     ``_CLOSES`` or faster; it is smaller for a slower one.
     """
-    if not obstacles.ids:
-        return np.zeros_like(own)
-    away = own - obstacles.positions
-    distance = np.sqrt(np.vecdot(away, away))
-    reserve = distance
-    if braking is not None:
-        spare = np.maximum(distance - obstacles.d_min[:, None], 0.0)
-        reserve = distance - np.maximum(stopping_distance(distance, braking, dt, reaction), -spare)
-    if (reserve >= obstacles.d_safe[:, None]).all():
-        return np.zeros_like(own)
-    force = magnitude(reserve, obstacles.d_min[:, None], obstacles.d_safe[:, None], gain, clamp)
-    near = distance < _NEAR
-    if near.any():
-        away[near] = (1.0, 0.0, 0.0)
-        distance[near] = 1.0
-    if turn:
-        away = _turned(away, turn * np.clip(closing_speed(distance, dt) / _CLOSES, 0.0, 1.0))
-    result: Array = np.einsum("jn,jni->ni", force / distance, away)
-    return result
+    force = np.zeros((len(own), 3))
+    if obstacles.ids:
+        _repulsion(
+            np.ascontiguousarray(own),
+            np.ascontiguousarray(obstacles.positions),
+            obstacles.d_min,
+            obstacles.d_safe,
+            gain,
+            clamp,
+            0.0 if braking is None else braking,
+            dt,
+            reaction,
+            turn,
+            force,
+        )
+    return force
 
 
-def _turned(away: Array, angle: Array) -> Array:
-    """Return vectors (M, N + 1, 3) rotated about the vertical by ``angle`` (M, N + 1), rad."""
-    c, s = np.cos(angle), np.sin(angle)
-    turned = away.copy()
-    turned[..., 0] = c * away[..., 0] - s * away[..., 1]
-    turned[..., 1] = s * away[..., 0] + c * away[..., 1]
-    return turned
+@part
+def stopping_distance(closing: float, braking: float, reaction: float) -> float:
+    """Return ċ²/(2 a_rel) + ċ·``reaction``, m, at the ``closing`` speed ċ (m/s); its sign is that of ċ."""
+    return closing * abs(closing) / (2.0 * braking) + closing * reaction
 
 
-def closing_speed(distance: Array, dt: float) -> Array:
-    """Return how fast distances (M, N + 1), m, shrink, m/s; negative where they grow."""
-    closing = np.empty_like(distance)
-    np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
-    closing[:, -1] = closing[:, -2]
-    closing /= dt
-    return closing
+@kernel(VOID, array(2), array(3), array(1), array(1), FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, output(2))
+def _repulsion(
+    own: Array,
+    positions: Array,
+    d_min: Array,
+    d_safe: Array,
+    gain: float,
+    clamp: float,
+    braking: float,
+    dt: float,
+    reaction: float,
+    turn: float,
+    force: Array,
+) -> None:
+    """Add the repulsion by obstacles at ``positions`` (M, N + 1, 3) to ``force`` (N + 1, 3).
 
-
-def stopping_distance(distance: Array, braking: float, dt: float, reaction: float = 0.0) -> Array:
-    """Return ċ²/(2 a_rel) + ċ·``reaction`` (M, N + 1), m, from predicted distances (M, N + 1), m.
-
-    ċ is the speed at which they shrink; the result is negative where they grow.
+    Without ``braking`` it is 0; the other arguments are those of ``repulsion``.
     """
-    closing = np.empty_like(distance)
-    np.subtract(distance[:, :-1], distance[:, 1:], out=closing[:, :-1])
-    closing[:, -1] = closing[:, -2]
-    result: Array = closing * np.abs(closing) * (0.5 / (braking * dt**2))
-    if reaction:
-        result += closing * (reaction / dt)
-    return result
+    steps = len(own)
+    if positions.shape[1] != steps or len(d_min) != len(positions) or len(d_safe) != len(positions):
+        raise ValueError("each obstacle needs a position per predicted position, a d_min and a d_safe")
+    away, distance = np.empty((steps, 3)), np.empty(steps)
+    for j in range(len(positions)):
+        for n in range(steps):
+            square = 0.0
+            for i in range(3):
+                away[n, i] = own[n, i] - positions[j, n, i]
+                square += away[n, i] * away[n, i]
+            distance[n] = sqrt(square)
+        for n in range(steps):
+            # The last step continues at the closing speed of the step before.
+            step = min(n, steps - 2)
+            closing = (distance[step] - distance[step + 1]) / dt
+            reserve = distance[n]
+            if braking > 0.0:
+                spare = max(distance[n] - d_min[j], 0.0)
+                reserve -= max(stopping_distance(closing, braking, reaction), -spare)
+            if reserve >= d_safe[j]:
+                continue
+            size = _magnitude(reserve, d_min[j], d_safe[j], gain, clamp)
+            x, y, z = away[n]
+            if distance[n] < _NEAR:
+                x, y, z = 1.0, 0.0, 0.0
+            else:
+                size /= distance[n]
+            if turn != 0.0:
+                angle = turn * min(max(closing / _CLOSES, 0.0), 1.0)
+                x, y = cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y
+            force[n, 0] += size * x
+            force[n, 1] += size * y
+            force[n, 2] += size * z
+
+
+def smoothed(force: Array, most: float, last: Array, share: float, *, planar: bool) -> Array:
+    """Return ``force`` (N + 1, 3) limited in norm to ``most`` (m/s²) and moved from ``last`` by a ``share``.
+
+    At a ``share`` of 1 the limited force is returned, at 0 ``last`` (N + 1, 3). ``planar`` forces have no
+    vertical component.
+    """
+    found = np.empty_like(force)
+    _smoothed(force, most, last, share, planar, found)
+    return found
+
+
+@kernel(VOID, array(2), FLOAT, array(2), FLOAT, BOOL, output(2))
+def _smoothed(force: Array, most: float, last: Array, share: float, planar: bool, found: Array) -> None:
+    """Write ``smoothed`` to ``found`` (N + 1, 3)."""
+    for n in range(len(force)):
+        x, y, z = force[n]
+        if planar:
+            z = 0.0
+        scale = most / max(sqrt(x * x + y * y + z * z), most)
+        found[n, 0] = last[n, 0] + share * (scale * x - last[n, 0])
+        found[n, 1] = last[n, 1] + share * (scale * y - last[n, 1])
+        found[n, 2] = last[n, 2] + share * (scale * z - last[n, 2])

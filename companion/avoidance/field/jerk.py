@@ -7,10 +7,12 @@ plan may change its first acceleration only slightly. An autopilot shapes faster
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
+from companion.values.compiled import FLOAT, VOID, array, kernel, output
 from companion.values.horizon import Array
 
 
@@ -34,19 +36,19 @@ class JerkRows:
         self.D: Array = np.eye(n) - np.eye(n, k=-1)
         self._dt = dt
         self._step: Array = np.repeat((j_max * dt)[:, None], n, axis=1)
-        self._j_max = j_max
+        self.j_max = j_max
         self._count = np.arange(n)
 
     def bounds(self, flown: Flown) -> tuple[Array, Array]:
         """Return lower and upper bounds (3, n) of D a."""
-        first = self._j_max * min(flown.elapsed, self._dt)
+        first = self.j_max * min(flown.elapsed, self._dt)
         low, high = -self._step.copy(), self._step.copy()
         low[:, 0], high[:, 0] = flown.acceleration - first, flown.acceleration + first
         return low, high
 
     def reach(self, flown: Flown) -> tuple[Array, Array]:
         """Return the least and the greatest accelerations (3, n), m/s², that the rows allow."""
-        grown = self._j_max[:, None] * (min(flown.elapsed, self._dt) + self._dt * self._count)
+        grown = self.j_max[:, None] * (min(flown.elapsed, self._dt) + self._dt * self._count)
         start = flown.acceleration[:, None]
         return start - grown, start + grown
 
@@ -68,11 +70,21 @@ def rate_limited(force: Array, last: Array, first: float, step: float) -> Array:
     The limit is ``first`` from ``last`` (3,) on, and ``step`` from one n to the next.
     """
     found = np.empty_like(force)
+    _rate_limited(force, last, first, step, found)
+    return found
+
+
+@kernel(VOID, array(2), array(1), FLOAT, FLOAT, output(2))
+def _rate_limited(force: Array, last: Array, first: float, step: float, found: Array) -> None:
+    """Write ``rate_limited`` to ``found`` (N + 1, 3)."""
+    x, y, z = last[0], last[1], last[2]
     most = first
     for n in range(len(force)):
-        change = force[n] - last
-        size = float(np.sqrt(change @ change))
-        last = last + change * (most / size) if size > most else force[n]
-        found[n] = last
+        dx, dy, dz = force[n, 0] - x, force[n, 1] - y, force[n, 2] - z
+        size = sqrt(dx * dx + dy * dy + dz * dz)
+        if size > most:
+            x, y, z = x + dx * (most / size), y + dy * (most / size), z + dz * (most / size)
+        else:
+            x, y, z = force[n, 0], force[n, 1], force[n, 2]
+        found[n, 0], found[n, 1], found[n, 2] = x, y, z
         most = step
-    return found

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.avoidance.field.dqmpc import Dqmpc, Problem
-from companion.avoidance.field.forces import repulsion
+from companion.avoidance.field.forces import repulsion, smoothed
 from companion.avoidance.field.jerk import Flown, rate_limited
 from companion.avoidance.field.methods import Influence, Method, Scene
 from companion.avoidance.field.methods.approach_angle import ApproachAngle
@@ -20,7 +20,6 @@ from companion.config.planning import LimitsConfig, MethodName
 from companion.surfaces import Surface
 from companion.values.horizon import Array, Horizon, roll_out
 from companion.values.obstacles import Obstacles
-from companion.values.vectors import limit
 
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
@@ -153,32 +152,29 @@ class Planner:
         influence = Influence(field, 1.0, scene.destination)
         for method in self._methods:
             influence = method.influence(scene, influence)
-        force = influence.force
-        if config.planar:
-            force = force * _FLAT
-        return influence._replace(force=self._smoothed(elapsed, limit(force, a_total)))
+        return influence._replace(force=self._smoothed(elapsed, influence.force))
 
     def _smoothed(self, elapsed: float, force: Array) -> Array:
-        """Return the field without its steps: neighbours' plans arrive at 10 Hz and would jolt the attitude.
+        """Return the field within its limit, and without its steps.
 
-        With bounded jerk the field changes no faster than the acceleration may, in time and along the
-        horizon.
+        Neighbours' plans arrive at 10 Hz, and their steps would jolt the attitude. With bounded jerk the
+        field changes no faster than the acceleration may, in time and along the horizon.
         """
-        j_max, dt = self.config.limits.j_max, self.dqmpc.dt
+        config, dt = self.config, self.dqmpc.dt
+        j_max, smoothing = config.limits.j_max, config.field.smoothing_us
+        share = 1.0
+        if j_max is None and elapsed < inf and smoothing > 0:
+            share = -expm1(-1e6 * elapsed / smoothing)
+        # The last field has moved on along its horizon since, which matters where plans are made seldom.
+        last = self._force[int(min(elapsed / dt, len(self._force) - 1))]
+        force = smoothed(force, config.limits.a_total, self._force, share, planar=config.planar)
         if j_max is not None:
             jerk = min(j_max)
-            # The last plan's field has moved on along its horizon since, which matters where plans are made
-            # seldom.
-            last = self._force[int(min(elapsed / dt, len(self._force) - 1))]
             force = rate_limited(force, last, jerk * min(elapsed, dt), jerk * dt)
-        elif elapsed < inf and self.config.field.smoothing_us > 0:
-            share = -expm1(-1e6 * elapsed / self.config.field.smoothing_us)
-            force = self._force + share * (force - self._force)
         self._force = force
         return force
 
 
-_FLAT = np.array([1.0, 1.0, 0.0])
 _SIGNS = {"own": 0.0, "right": 1.0, "left": -1.0}
 """Sign of the angle by which forces are turned; 0 where each vehicle has a turning sense of its own."""
 _NEAREST_COUNTS = 20.0

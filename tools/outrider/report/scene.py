@@ -1,4 +1,4 @@
-"""Scene of the replay: obstacles, goals and surfaces around the vehicles, as plain values for the page."""
+"""Scenery of the animated flight on the report's page: obstacles, goals and surfaces, as values for JSON."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ _MAX_SPAN = 100.0
 def scene(run: Run, motions: Motions) -> dict[str, Any]:
     """Return the scene; lengths in m, fleet-local ENU.
 
-    It has fixed obstacles (``fixed``: posts and spheres), ``movers`` in the order of the moving obstacles,
-    ``goals``, and ``surfaces``: closed lines as offsets from the target.
+    ``span`` is the vehicles' (m), ``dMin`` the least distance of the scenario, None if it is unknown.
+    ``fixed`` are posts and spheres, ``movers`` are in the order of the moving obstacles, ``surfaces`` are
+    lines as offsets from the target, and ``bystanders`` is the number of these vehicles.
     """
     scenario, span = run.scenario, run.summary.get("span_m")
     d_min = run.summary.get("d_min_m") if scenario is None else scenario.d_min
@@ -59,9 +60,9 @@ def _goals(run: Run, motions: Motions) -> list[list[float]]:
 
 
 def _surfaces(scenario: Scenario) -> list[dict[str, Any]]:
-    """Return the fleet's surface, and those of vehicles with a surface of their own.
+    """Return the fleet's surface, unless every vehicle has its own, and those of the vehicles.
 
-    A companion that flies to a goal has none.
+    With another task than ``escort`` there are none.
     """
     companion = scenario.companion
     if companion.task != "escort":

@@ -178,7 +178,7 @@ class Fleet:
                     ends_here.append(End(names.backup_node(system), link, words))
                 channels.append(_channel(f"{link}-{name}", ends_here, getattr(links, link)))
             if k in self.with_backup:
-                # Both run on the same computer, so nothing is lost.
+                # Companion and backup node run on the same computer: what they send each other is not lost.
                 channels.append(
                     Channel(f"helm-{name}", {name: "swarm", names.backup_node(system): "swarm"}, Faults())
                 )

@@ -1,8 +1,8 @@
-"""Journal of a sweep: a header, then a JSON line for each run that ended or was lost; lines never change.
+"""Journal of a sweep: a header, then a JSON line each time that a run ends or is lost; lines never change.
 
 A line counts when its newline is written; an incomplete line after the last newline is removed on resume.
-Each line is one write on a file opened to append. It is synced to the disk about `SYNC_S` later, or when the
-journal closes. The file is locked while a sweep uses it.
+Each line is one write on a file opened to append. Lines are synced to the disk when `SYNC_S` have passed
+since the last time, and when the journal closes. The file is locked while a sweep uses it.
 """
 
 from __future__ import annotations
@@ -46,7 +46,10 @@ class Journal:
         self.entries = entries
 
     def append(self, entry: Entry) -> None:
-        """Write the line of a run that has ended. Raises OutriderError if the disk does not take it."""
+        """Write the line of a run that has ended or was lost.
+
+        Raises OutriderError if the line was written only in part, and OSError if it could not be written.
+        """
         _write(self._descriptor, self._path, {"run": entry._asdict()})
         self.entries[entry.run] = entry
         self._dirty = True

@@ -1,4 +1,4 @@
-"""Figures of one finished run, taken from its journal entry."""
+"""Figures of one run that ended or was lost, taken from its journal entry."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ class Ending(Enum):
 class Run(NamedTuple):
     """Figures of one run.
 
-    ``seconds`` to converge: inf if it did not, None if there was no goal. ``separation``: least distance
-    between vehicles, m; ``to_obstacle``: least distance from a centre to a surface, m. ``yaw`` (deg) and
-    ``tracking`` (m) are the run's 95th percentiles. ``what`` describes the error, the loss or the failure.
+    ``seconds`` to converge: inf if it did not, None without a goal or a summary. ``separation``: least
+    distance between vehicles, m; ``to_obstacle``: least distance from a centre to a surface, m. ``yaw`` (deg)
+    and ``tracking`` (m) are the 95th percentiles of these errors. ``what`` describes the error, the loss or
+    the failure.
     """
 
     seed: int
@@ -47,7 +48,10 @@ class Run(NamedTuple):
 
 
 def run_of(entry: Entry) -> Run:
-    """Return the figures of an entry. Figures that its summary does not have are None."""
+    """Return the figures of an entry.
+
+    Figures that its summary does not have are None; ``violations`` is then 0.
+    """
     if entry.summary is None:
         ending = Ending.LOST if entry.status == "lost" else Ending.FAULT
         nothing = (None,) * 4

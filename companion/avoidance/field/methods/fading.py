@@ -15,11 +15,6 @@ from companion.values.horizon import Array
 _Number = TypeVar("_Number", float, Array)
 
 
-def share(x: float) -> float:
-    """Return ``x`` clipped to 0…1."""
-    return min(max(x, 0.0), 1.0)
-
-
 def shares(x: Array) -> Array:
     """Return ``x`` clipped to 0…1; ``np.clip`` costs four times as much for arrays as small as these."""
     result: Array = np.minimum(np.maximum(x, 0.0), 1.0)

@@ -1,16 +1,18 @@
 """Swivelling destination (Sec. III-D.1): the destination moves along the surface.
 
-x̌ = x_P + [d cos(ψ ± k_s‖∇J‖), d sin(ψ ± k_s‖∇J‖), h], eq. (12): it moves the further, the more is left of
-the way. On any other surface the destination is likewise turned about the vertical through the target, and
-the nearest point of the surface is taken. A goal that is one point is turned alike. In all cases the
-destination is back when nothing is left of the way.
+x̌ = x_P + [d cos(ψ ± k_s‖∇J‖), d sin(ψ ± k_s‖∇J‖), h], eq. (12), on the paper's surface: a circle of radius
+d, at the height h, about the target x_P. ψ is the bearing of the vehicle from the target. The longer the rest
+of the way, the larger is ‖∇J‖ and the angle. On any other surface, too, the destination is turned about the
+vertical through the target by this angle, and then moved to the nearest point of the surface. A goal that is
+one point is turned about the target as well. At the end of the way the angle is zero.
 
-Deviations from the paper. The gradient is its norm divided by Ω_t, for which k_s = 0.05 is meant, and it
-turns the destination by a quarter turn at most. The paper turns by the sign of ψ. That spreads vehicles that
-come from the west and gathers those that come from the east, and so depends on where north is. Here a vehicle
-turns away from the side on which the others are, as seen from the target; a vehicle without others beside it
-need not swivel. The sense is latched until the vehicle has almost arrived; otherwise two vehicles abreast
-chatter.
+Deviations from the paper. ‖∇J‖ is the norm of the gradient divided by Ω_t, in m; the paper's k_s = 0.05
+belongs to a gradient of another scale. The angle is at most a quarter turn. In the paper the sign of ψ
+selects the side, so the result depends on where north is. Here, with the turning sense ``own``, a vehicle
+turns away from the side on which most obstacles (vehicles and others) are, as seen from the target. With a
+common turning sense every vehicle turns to that side. A vehicle does not turn if nothing is around the
+target, or if both sides balance. The side is latched at the first reason to turn, until the vehicle has
+almost arrived; otherwise two vehicles abreast chatter.
 """
 
 from __future__ import annotations
@@ -25,13 +27,16 @@ from companion.values.bearings import turned, wrapped
 
 _MOST = 0.5 * pi
 _BESIDE = 0.3
-"""Angle (rad) over which the weight of others falls by 1/e with their distance aside."""
+"""Difference of bearings (rad) at which the weight of an obstacle has fallen to 1/e."""
 _ABOVE = 0.1
-"""Horizontal distance (m) from the target's vertical below which there is no bearing."""
+"""Horizontal distance (m) from the target's vertical below which an obstacle has no bearing.
+
+For the own vehicle it is the larger of the two coordinates.
+"""
 
 
 class Swivel:
-    """Turn of the destination; latches one sense from the start to the arrival."""
+    """Turn of the destination; latches the side at the first reason to turn, until the arrival."""
 
     def __init__(self, config: SwivelConfig, turning: TurningSense) -> None:
         self._config = config

@@ -8,26 +8,29 @@ last plan.
 
 Deviations from the paper. ‖∇J‖ is divided by Ω_t. The band reaches from the obstacle to d_safe + d_band, and
 further for an obstacle that closes fast (``reach_s`` times the closing speed), because turning aside takes a
-given time. The force grows from zero at the band's edge, first steeply to u_max (which the input can cancel),
-then to ``force_max`` at ``d_full``. It acts in full up to 60° from the direction to the destination, and
-vanishes at 90°, so that the band is left once the obstacle is passed. It vanishes for obstacles more than
-d_safe beyond the destination, and when the vehicle has almost arrived. The sense of an obstacle is kept while
-its weight is positive; otherwise it would alternate when the bearing crosses zero. With a common turning
-sense an obstacle may be on the side on which it is not to be passed. The force about it then points away from
-the destination, and fades out with the bearing to that side (``wrong_side``): the whole force pushes vehicles
-out of a ring. Where all ways cross in one place, the whole force makes the vehicles turn about that place.
-Obstacles less than ``gap`` apart share one sense; otherwise a vehicle would be steered into a U-shaped group.
+given time. The force k_tang ‖∇J‖ is limited. The limit grows from zero at the band's edge, first steeply to
+about u_max (which the input can cancel), then to ``force_max`` at ``d_full`` plus the obstacle's radius. The
+force acts in full up to 60° from the direction to the destination, and vanishes at 90°, so that the band is
+left once the obstacle is passed. It vanishes for obstacles more than d_safe beyond the destination, and when
+the vehicle has almost arrived. The sense of an obstacle is kept while its weight is positive; otherwise it
+would alternate when the bearing crosses zero. With a common turning sense an obstacle may be on the side on
+which it is not to be passed. The force about it then points away from the destination, and fades out with the
+bearing to that side (``wrong_side``). Without this fading the force would push vehicles that surround a
+target out of their places. A scenario in which the courses of all vehicles cross at one point does without
+it: there the unfaded force makes the vehicles circle about that point in the common sense. An obstacle that
+is newly latched takes the sense of the obstacles connected to it by gaps of less than ``gap``; otherwise a
+vehicle would be steered into a U-shaped group.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from math import hypot, sqrt
 
 import numpy as np
 
 from companion.avoidance.field.methods import Influence, Scene
-from companion.avoidance.field.methods.fading import reserve, share, shares
 from companion.config.planning import TangentialConfig, TurningSense
+from companion.values.compiled import BOOL, FLOAT, VOID, array, kernel, output, part
 from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
 
@@ -49,8 +52,12 @@ push the vehicle out of its place.
 """
 _SLOW, _SOON = 0.5, 3.0
 """Speed (m/s) that regularises the time of closest approach, and the longest such time (s)."""
-_RIGHT: Array = np.array([1.0])
-_LEFT: Array = np.array([-1.0])
+
+
+@part
+def _share(x: float) -> float:
+    """Return ``x`` clipped to 0…1."""
+    return min(max(x, 0.0), 1.0)
 
 
 class Tangential:
@@ -69,70 +76,42 @@ class Tangential:
         if not obstacles.ids:
             self._sense.clear()
             return influence
-        away = scene.position - obstacles.positions[:, 0]
-        square = away * away
-        flat = np.sqrt(square[:, 0] + square[:, 1]) + _NEAR
-        distance = np.sqrt(square.sum(axis=1)) + _NEAR
-        # An obstacle straight above or below has no horizontal passing direction.
-        weight = self._weights(scene, away, distance) * shares(_STEEP * flat / distance)
-        self._release(obstacles, weight)
-        # α̂ = ± ẑ × α is horizontal: the force does not change the height.
-        senses = self._senses(obstacles, weight, away, scene.to_go)
-        if self._turning != "own" and self._config.wrong_side is not None:
-            weight = weight * _onward(senses, away, flat, scene.to_go, *self._config.wrong_side)
-        signed = weight * senses / flat
-        total = np.array([-(signed @ away[:, 1]), signed @ away[:, 0], 0.0])
-        norm = sqrt(total @ total)
-        if norm < _NEAR:
-            return influence
-        whole = min(norm, 1.0)
-        config, u_max = self._config, self._u_max
-        strength = min(
-            config.k_tang * sqrt(scene.gradient @ scene.gradient),
-            u_max * min(1.0, _QUICK * whole) + (config.force_max - u_max) * whole,
-        )
-        direction = total / norm
-        # The force falls with the speed along it, to zero at the speed from which half of u_max stops within
-        # the distance to the destination.
-        sideways = float((scene.velocity - scene.destination_velocity) @ direction)
-        most = min(config.pass_speed, sqrt(u_max * sqrt(scene.to_go @ scene.to_go)) + _NEAR)
-        strength *= share(reserve(sideways, most))
-        return influence._replace(
-            force=influence.force + direction * strength, omega_scale=config.omega_scale
-        )
-
-    def _weights(self, scene: Scene, away: Array, distance: Array) -> Array:
-        """Return how much each obstacle's band acts, (M,) in 0…1.
-
-        ``away`` (M, 3), m, leads from the obstacles to the vehicle; ``distance`` (M,) are its norms.
-        """
-        config, obstacles = self._config, scene.obstacles
-        moving = (obstacles.positions[:, 1] - obstacles.positions[:, 0]) / self._dt
-        closing = np.maximum(np.vecdot(away, moving - scene.velocity) / distance, 0.0)
-        edge = obstacles.d_safe + config.d_band + config.reach_s * closing
-        depth = shares((edge - distance) / (edge - config.d_full - obstacles.radius))
-        to_go = scene.to_go
-        length = sqrt(to_go @ to_go) + _NEAR
-        along = -(away @ to_go) / length
-        ahead = shares(along / (_COSINE_FULL * distance))
-        before = shares(1.0 + (length - along) / obstacles.d_safe)
-        before *= share((length - _THERE) / (_ON_THE_WAY - _THERE))
-        weights: Array = depth * ahead * before * self._meeting(obstacles, away, moving - scene.velocity)
-        return weights
-
-    def _meeting(self, obstacles: Obstacles, away: Array, velocity: Array) -> Array:
-        """Return a share (0…1) by the closest approach of each obstacle at constant velocities.
-
-        1 is within ``d_full``, 0 is d_safe or more.
-
-        ``velocity`` (M, 3), m/s, is relative to the own velocity.
-        """
         config = self._config
-        square = np.vecdot(velocity, velocity) + _SLOW**2
-        time = np.minimum(np.maximum(np.vecdot(away, velocity) / square, 0.0), _SOON)
-        miss = away - time[:, None] * velocity
-        distance = np.sqrt(np.vecdot(miss, miss))
-        return shares((obstacles.d_safe - distance) / (obstacles.d_safe - config.d_full - obstacles.radius))
+        count = len(obstacles.ids)
+        weight, away = np.empty(count), np.empty((count, 3))
+        _weights(
+            scene.position,
+            scene.velocity,
+            scene.to_go,
+            np.ascontiguousarray(obstacles.positions),
+            obstacles.d_safe,
+            obstacles.radius,
+            config.d_band,
+            config.reach_s,
+            config.d_full,
+            self._dt,
+            weight,
+            away,
+        )
+        self._release(obstacles, weight)
+        senses = self._senses(obstacles, weight, away, scene.to_go)
+        if self._turning != "own" and config.wrong_side is not None:
+            _fade_wrong_side(senses, away, scene.to_go, *config.wrong_side, weight)
+        force = influence.force.copy()
+        acts = _add(
+            weight,
+            senses,
+            away,
+            scene.to_go,
+            scene.velocity,
+            scene.destination_velocity,
+            config.k_tang * sqrt(scene.gradient @ scene.gradient),
+            self._u_max,
+            config.force_max,
+            config.pass_speed,
+            force,
+        )
+        return influence._replace(force=force, omega_scale=config.omega_scale) if acts else influence
 
     def _release(self, obstacles: Obstacles, weight: Array) -> None:
         if not self._sense:
@@ -149,7 +128,7 @@ class Tangential:
         """
         config = self._config
         if self._turning != "own":
-            return _RIGHT if self._turning == "right" else _LEFT
+            return np.full(len(weight), 1.0 if self._turning == "right" else -1.0)
         senses = np.zeros(len(weight))
         acting = np.flatnonzero(weight > 0.0)
         new = [j for j in acting if obstacles.ids[j] not in self._sense]
@@ -167,7 +146,8 @@ class Tangential:
     ) -> None:
         """Latch the sense of the obstacles that are new in a group.
 
-        It is the sense of the group, or else follows from the side on which most of the group is.
+        It is the sense of the latched obstacle with the greatest weight. If none is latched, or if several of
+        that weight disagree, the side of the course on which the weighted group lies decides.
         """
         names = [obstacles.ids[j] for j in group]
         known = [
@@ -187,16 +167,126 @@ class Tangential:
             self._sense.setdefault(name, sense)
 
 
-def _onward(senses: Array, away: Array, flat: Array, to_go: Array, whole: float, zero: float) -> Array:
-    """Return the share (0…1) of the force about each obstacle, (M,), with a common turning sense.
+@kernel(
+    VOID,
+    array(1),
+    array(1),
+    array(1),
+    array(3),
+    array(1),
+    array(1),
+    FLOAT,
+    FLOAT,
+    FLOAT,
+    FLOAT,
+    output(1),
+    output(2),
+)
+def _weights(
+    position: Array,
+    velocity: Array,
+    to_go: Array,
+    positions: Array,
+    d_safe: Array,
+    radius: Array,
+    d_band: float,
+    reach_s: float,
+    d_full: float,
+    dt: float,
+    weight: Array,
+    away: Array,
+) -> None:
+    """Write to ``weight`` (M,) how much each obstacle's band acts, 0…1: the product of all its shares.
 
-    The share falls where the force points away from the destination: from 1 at the sine ``whole`` of the
-    bearing to 0 at the sine ``zero``. ``away`` (M, 3), m, leads from the obstacles to the vehicle; ``flat``
-    (M,) are its horizontal norms.
+    ``away`` (M, 3), m, receives the vectors from the obstacles at ``positions`` (M, N + 1, 3) to the vehicle.
+    ``radius`` is (M,) or (1,).
     """
-    length = sqrt(to_go @ to_go) + _NEAR
-    sine = senses * (away[:, 0] * to_go[1] - away[:, 1] * to_go[0]) / (flat * length)
-    return shares((sine + zero) / (zero - whole))
+    if len(d_safe) != len(positions) or (len(radius) != len(positions) and len(radius) != 1):
+        raise ValueError("each obstacle needs a d_safe and a radius")
+    length = sqrt(to_go[0] ** 2 + to_go[1] ** 2 + to_go[2] ** 2) + _NEAR
+    arriving = _share((length - _THERE) / (_ON_THE_WAY - _THERE))
+    for j in range(len(positions)):
+        square = speed_square = approach = ahead = 0.0
+        for i in range(3):
+            off = position[i] - positions[j, 0, i]
+            relative = (positions[j, 1, i] - positions[j, 0, i]) / dt - velocity[i]
+            away[j, i] = off
+            square += off * off
+            speed_square += relative * relative
+            approach += off * relative
+            ahead -= off * to_go[i] / length
+        distance = sqrt(square) + _NEAR
+        full = d_full + radius[j % len(radius)]
+        edge = d_safe[j] + d_band + reach_s * max(approach / distance, 0.0)
+        depth = _share((edge - distance) / (edge - full))
+        before = _share(1.0 + (length - ahead) / d_safe[j])
+        # The closest approach at constant velocities.
+        time = min(max(approach / (speed_square + _SLOW**2), 0.0), _SOON)
+        miss = sqrt(max(square - time * (2.0 * approach - time * speed_square), 0.0))
+        meeting = _share((d_safe[j] - miss) / (d_safe[j] - full))
+        # An obstacle straight above or below has no horizontal passing direction.
+        level = _share(_STEEP * (hypot(away[j, 0], away[j, 1]) + _NEAR) / distance)
+        weight[j] = depth * _share(ahead / (_COSINE_FULL * distance)) * before * arriving * meeting * level
+
+
+@kernel(VOID, array(1), array(2), array(1), FLOAT, FLOAT, output(1))
+def _fade_wrong_side(
+    senses: Array, away: Array, to_go: Array, whole: float, zero: float, weight: Array
+) -> None:
+    """Lower the ``weight`` (M,) of obstacles on the side on which a common turning sense does not pass them.
+
+    There the force points away from the destination. It falls from 1 at the sine ``whole`` of the bearing to
+    0 at the sine ``zero``. ``away`` (M, 3), m, leads from the obstacles to the vehicle.
+    """
+    length = sqrt(to_go[0] ** 2 + to_go[1] ** 2 + to_go[2] ** 2) + _NEAR
+    for j in range(len(weight)):
+        flat = hypot(away[j, 0], away[j, 1]) + _NEAR
+        sine = senses[j] * (away[j, 0] * to_go[1] - away[j, 1] * to_go[0]) / (flat * length)
+        weight[j] *= _share((sine + zero) / (zero - whole))
+
+
+@kernel(
+    BOOL, array(1), array(1), array(2), array(1), array(1), array(1), FLOAT, FLOAT, FLOAT, FLOAT, output(2)
+)
+def _add(
+    weight: Array,
+    senses: Array,
+    away: Array,
+    to_go: Array,
+    velocity: Array,
+    destination_velocity: Array,
+    pull: float,
+    u_max: float,
+    force_max: float,
+    pass_speed: float,
+    force: Array,
+) -> bool:
+    """Add F_tang, eq. (18), to ``force`` (N + 1, 3); return whether there is any.
+
+    ``pull`` is k_tang ‖∇J‖ of eq. (16).
+    """
+    x = y = 0.0
+    for j in range(len(weight)):
+        # α̂ = ± ẑ × α is horizontal: the force does not change the height.
+        signed = weight[j] * senses[j] / (hypot(away[j, 0], away[j, 1]) + _NEAR)
+        x -= signed * away[j, 1]
+        y += signed * away[j, 0]
+    norm = hypot(x, y)
+    if norm < _NEAR:
+        return False
+    x, y = x / norm, y / norm
+    whole = min(norm, 1.0)
+    strength = min(pull, u_max * min(1.0, _QUICK * whole) + (force_max - u_max) * whole)
+    # The force fades with the speed along it: whole up to half of ``most``, zero from ``most`` on. From that
+    # speed half of u_max stops within the distance to the destination.
+    sideways = (velocity[0] - destination_velocity[0]) * x + (velocity[1] - destination_velocity[1]) * y
+    length = sqrt(to_go[0] ** 2 + to_go[1] ** 2 + to_go[2] ** 2)
+    most = min(pass_speed, sqrt(u_max * length) + _NEAR)
+    strength *= _share(2.0 * (1.0 - sideways / most))
+    for n in range(len(force)):
+        force[n, 0] += x * strength
+        force[n, 1] += y * strength
+    return True
 
 
 def groups(places: Array, radius: Array, gap: float) -> list[list[int]]:

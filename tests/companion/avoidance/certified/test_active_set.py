@@ -33,9 +33,12 @@ def test_the_binding_rows_determine_the_minimiser(seed: int) -> None:
     chosen = np.sort(found[:count])
     whole = solve_once(P, c, A, b, G, low, x_min, x_max)
     part = solve_once(P, c, A, b, G[chosen], low[chosen], x_min, x_max)
-    np.testing.assert_allclose(part.x, whole.x, atol=1e-5)
-    slack = G @ whole.x - low
-    assert set(np.flatnonzero(whole.multipliers > 1e-3)) <= set(chosen) <= set(np.flatnonzero(slack < 1e-4))
+    # The solver stops at a duality gap; the Hessian's curvature is at least 1, so this is a distance.
+    gap = 1e-9 * (1.0 + abs(0.5 * whole.x @ P @ whole.x + c @ whole.x))
+    near = 2.0 * np.sqrt(2.0 * gap)
+    np.testing.assert_allclose(part.x, whole.x, atol=near)
+    slack = (G @ whole.x - low) / np.linalg.norm(G, axis=1)
+    assert set(np.flatnonzero(whole.multipliers > 1e-3)) <= set(chosen) <= set(np.flatnonzero(slack < near))
 
 
 def test_rows_that_contradict_each_other_have_no_minimiser() -> None:

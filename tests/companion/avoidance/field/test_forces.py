@@ -159,15 +159,12 @@ def test_a_common_velocity_changes_nothing_closing_adds_and_opening_takes_away(p
 
 
 @LAWS
-@given(start=numbers(0.1, 20.0), speed=numbers(0.0, 10.0), braking=numbers(0.5, 20.0))
-def test_the_stopping_distance_is_that_of_uniform_braking(start, speed, braking):
-    """And as much to spare, for who moves away."""
-    time = DT * np.arange(16)
-    receding, closing = start + speed * time, start + speed * (time[-1] - time)
-    for distance, sign in ((closing, 1.0), (receding, -1.0)):
-        np.testing.assert_allclose(
-            stopping_distance(distance[None], braking, DT), sign * speed**2 / (2 * braking), atol=1e-9
-        )
+@given(speed=numbers(0.0, 10.0), braking=numbers(0.5, 20.0), reaction=numbers(0.0, 1.0))
+def test_the_stopping_distance_is_that_of_uniform_braking_after_the_reaction(speed, braking, reaction):
+    """A vehicle that moves away has the same distance to spare."""
+    for sign in (1.0, -1.0):
+        expected = sign * (speed**2 / (2 * braking) + reaction * speed)
+        assert stopping_distance(sign * speed, braking, reaction) == pytest.approx(expected, abs=1e-9)
 
 
 @LAWS

@@ -261,7 +261,7 @@ def test_an_obstacle_in_the_same_place_or_above_gives_a_finite_force(place):
 def test_who_is_passed_by_far_is_not_passed_around(aside, speed):
     """In the band and ahead, but its course leads past by more than d_safe."""
     place = [2.0, aside, 0.0]
-    assert not force(obstacles([place]), velocity=[speed, 0.0, 0.0])[0].any()
+    assert not force(obstacles([place]), velocity=np.array([speed, 0.0, 0.0]))[0].any()
 
 
 def test_who_is_fast_sideways_is_not_made_faster():
