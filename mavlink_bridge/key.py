@@ -85,8 +85,8 @@ def read_key(path: Path | str) -> Key:
     if len(line) >= _MIN_DIGITS and _DIGITS.issuperset(line):
         if len(line) != 2 * LENGTH:
             raise KeyFileError(
-                f"{path}: has {len(line)} hexadecimal digits; a key has {2 * LENGTH} (a passphrase has other "
-                f"letters too)"
+                f"{path}: has {len(line)} hexadecimal digits; a key has {2 * LENGTH} (a passphrase of this "
+                f"length needs another character)"
             )
         key = Key(bytes.fromhex(line))
         if key.blank:
@@ -124,8 +124,8 @@ def _text(path: Path | str) -> str:
                 raise KeyFileError(f"{path}: is not a file")
             if os.name == "posix" and found.st_mode & _OTHERS:
                 raise KeyFileError(
-                    f"{path}: others may read or change it (mode {stat.S_IMODE(found.st_mode):03o}); "
-                    f"chmod 600 {path}"
+                    f"{path}: users other than its owner have permissions on it "
+                    f"(mode {stat.S_IMODE(found.st_mode):03o}); chmod 600 {path}"
                 )
             data = file.read(_MAX_FILE_BYTES + 1)
         if len(data) > _MAX_FILE_BYTES:

@@ -1,9 +1,9 @@
 """Geometric tracking controller of Lee, Leok and McClamroch (CDC 2010) with complete feed-forward.
 
 Notation of the paper, e3 down: A is the force, apart from gravity, that the vehicle should receive, and
-b3c = −A/‖A‖. Added to the paper: the rotor drag at zero wind can be cancelled (after Faessler, Franchi and
-Scaramuzza, 2018, who show that a drag linear in velocity only turns A), as can the disturbance estimated by
-``observer``, and A can be limited to a greatest tilt.
+b3c = −A/‖A‖. Added to the paper: A can contain terms that cancel the rotor drag at zero wind (after Faessler,
+Franchi and Scaramuzza, 2018: a drag linear in velocity) and the disturbance estimated by ``observer``, and A
+can be limited to a greatest tilt.
 """
 
 from __future__ import annotations
@@ -90,11 +90,11 @@ def commanded_attitude(
 ) -> tuple[Axes, Vector, Vector]:
     """Return R_c, Ω_c and Ω̇_c from A and its derivatives, and from b1d (``nose``) and the derivatives of ψ.
 
-    The paper takes b2c normal to b1d, which turns the nose of a tilted vehicle away from ψ by up to half its
-    tilt squared. With ``euler_heading`` b1c instead lies in the vertical plane of b1d, so that ψ is the yaw
-    of MAVLink. If A nearly vanishes, b3c is the present b3, without rates of change. If b3c is nearly along
-    b1d (with ``euler_heading``: along b1d's right), there is no heading to follow: the nose keeps its
-    direction, and Ω_c and Ω̇_c are zero.
+    The paper takes b2c normal to b1d, which turns the nose of a tilted vehicle away from ψ by up to about
+    half the square of its tilt (rad). With ``euler_heading`` b1c instead lies in the vertical plane of b1d,
+    so that ψ is the yaw of MAVLink. If A nearly vanishes, b3c is the present b3, without rates of change. If
+    b3c is nearly along b1d (with ``euler_heading``: along b1d's right), there is no heading to follow: the
+    nose keeps its direction, and Ω_c and Ω̇_c are zero.
     """
     still = (0.0, 0.0, 0.0)
     down = (times(-1.0, A[0]), times(-1.0, A[1]), times(-1.0, A[2]))
@@ -116,7 +116,7 @@ def commanded_attitude(
         C = cross_with_rates(b3, (nose, times(yaw_rate, aside), turning))
     upright = dot(C[0], C[0]) <= _UPRIGHT_NOSE * _UPRIGHT_NOSE
     if some(upright):
-        # At most one of b1 and b2 can be along b3c.
+        # At most one of the vehicle's present axes axes[0] and axes[1] can be along b3c.
         side = cross(b3[0], axes[0])
         along = dot(side, side) < _UPRIGHT_NOSE * _UPRIGHT_NOSE
         side = chosen(along, plus(axes[1], -dot(axes[1], b3[0]), b3[0]), side)
@@ -148,9 +148,10 @@ def desired_force(
     """Return the thrust f (N) and A with its first two derivatives.
 
     A = −k_x e_x − k_v e_v − m g e3 + m ẍ_d + D ẋ_d − d with the known disturbance d (N, NED), and f = −(A − D
-    ẋ_d)·b3. D is the cancelled drag: −D v⊥ is −D v and a force along b3, so that the first turns A and the
-    second is part of f. The derivatives use the measured acceleration instead of the paper's modelled one,
-    which would be permanently wrong in a steady wind, and the jerk of the model.
+    ẋ_d)·b3. D (N s/m) is the coefficient of the cancelled drag, −D v⊥ = −D v + D (v·b3) b3: D ẋ_d in A
+    cancels the first term; the second is along the thrust. If A is limited, f is at least 0, and where A was
+    changed its derivatives are zero. The derivatives use the measured acceleration instead of the paper's
+    modelled one, which would be permanently wrong in a steady wind, and the jerk of the model.
     """
     m, k_x, k_v, D = airframe.mass, airframe.k_x, airframe.k_v, airframe.cancelled_drag
     b3 = axes[2]
@@ -203,8 +204,8 @@ def control(
     """Return thrust f (N, along −b3) and moment M (N m, body) that track a trajectory (NED) and a yaw (rad).
 
     M = −k_R e_R − k_Ω e_Ω + Ω×JΩ − J(Ω̂RᵀR_cΩ_c − RᵀR_cΩ̇_c), Ω̂ being the cross product with Ω, less the
-    moment of the cancelled rotor drag, which acts at the height of the rotors, and that of the known
-    ``disturbance``.
+    cancelled moments of the rotors (``drag_moment``: drag at their height, rolling moment, drag against the
+    yaw rate) and that of the known ``disturbance``. Without ``rate_feed_forward`` Ω_c and Ω̇_c are zero.
     """
     f, A = desired_force(position, velocity, acceleration, axes, rates, target, disturbance[0], airframe)
     nose = limited_nose(yaw, axes, airframe)

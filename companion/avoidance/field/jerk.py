@@ -1,8 +1,8 @@
 """Bound on jerk, as rows of the QPs: |a(0) − a₋| ≤ j·h, |a(n) − a(n − 1)| ≤ j·dt.
 
-a₋ is the acceleration flown until now, and h the time since the last plan began: with frequent replanning a
-plan may change its first acceleration only slightly. An autopilot shapes faster changes on its own, late
-(PSC_JERK_XY), and then the vehicle is not where the plan says.
+a₋ is the acceleration flown until now, and h the time since the last plan began, at most dt: with frequent
+replanning a plan may change its first acceleration only slightly. An autopilot shapes faster changes on its
+own, late (PSC_JERK_XY), and then the vehicle is not where the plan says.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from companion.values.horizon import Array
 class Flown(NamedTuple):
     """Motion that a plan continues: the ``acceleration`` (3,), m/s², flown until now.
 
-    ``elapsed``: for how long (s) the plan that it comes from has been flown.
+    ``elapsed``: time (s) since the planner was last called; ∞ for the first plan.
     """
 
     acceleration: Array
@@ -27,9 +27,9 @@ class Flown(NamedTuple):
 
 
 class JerkRows:
-    """Rows for N + 1 accelerations per axis, ``dt`` (s) apart, with ``j_max`` (3,), m/s³.
+    """Rows for ``n`` = N + 1 accelerations per axis, ``dt`` (s) apart, with ``j_max`` (3,), m/s³.
 
-    ``D`` (n, n) is the matrix of the rows.
+    ``D`` (n, n) is their matrix: it gives a(0), and the differences of consecutive accelerations.
     """
 
     def __init__(self, n: int, dt: float, j_max: Array) -> None:
@@ -65,9 +65,10 @@ class JerkRows:
 
 
 def rate_limited(force: Array, last: Array, first: float, step: float) -> Array:
-    """Return the field (N + 1, 3) with its change limited in norm.
+    """Return the field ``force`` (N + 1, 3), m/s², with its changes limited in norm.
 
-    The limit is ``first`` from ``last`` (3,) on, and ``step`` from one n to the next.
+    The change from ``last`` (3,), the last plan's field at this time, to ``force[0]`` is at most ``first``;
+    the change from each step to the next is at most ``step``.
     """
     found = np.empty_like(force)
     _rate_limited(force, last, first, step, found)

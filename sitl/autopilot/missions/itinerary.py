@@ -133,9 +133,13 @@ class Itinerary:
         else:
             self.pause()
 
+    def has(self, seq: int) -> bool:
+        """Return whether item ``seq`` exists."""
+        return 0 <= seq < len(self._items)
+
     def select(self, seq: int) -> bool:
         """Continue with item ``seq`` at the next ``advance``; return False if it does not exist."""
-        if not 0 <= seq < len(self._items):
+        if not self.has(seq):
             return False
         self.phase, self.current = Phase.IDLE, max(seq, self._first)
         self._jumps.clear()

@@ -116,13 +116,16 @@ class MissionService:
     def _order_current(self, order: Order) -> CommandRefusal | None:
         """Execute DO_SET_MISSION_CURRENT.
 
-        Parameter 1 is the item, −1 for no change; parameter 2 is 1 to begin anew.
+        If parameter 2 is 1, the mission returns to its first item. Parameter 1 is the item to continue with;
+        −1 selects none. A refused command changes nothing.
         """
         seq, anew = order.params[:2]
+        if seq != -1.0 and not (math.isfinite(seq) and self._itinerary.has(int(seq))):
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"No mission item {seq:.0f}")
         if anew == 1.0:
             self._itinerary.rewind()
-        if seq != -1.0 and not (math.isfinite(seq) and self._itinerary.select(int(seq))):
-            return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"No mission item {seq:.0f}")
+        if seq != -1.0:
+            self._itinerary.select(int(seq))
         self._telemetry.request(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
         return None
 

@@ -155,7 +155,7 @@ parts:
         ("period_us: 8.0", "period_us is 8.0; allowed: a whole number > 0, a multiple of 4; did you mean 8?"),
         (
             "period_us: 99999999999999999999",
-            "99999999999999999999 is too large; allowed: integers of 64 bits",
+            "99999999999999999999 is out of range; allowed: integers from −2^63 to 2^63 − 1",
         ),
         ("armed: on", "armed is 'on'; allowed: true or false; did you mean true?"),
         ("armed: 1", "armed is 1; allowed: true or false"),

@@ -1,8 +1,9 @@
 """Worker process: ``python -m outrider.sweep.worker MODULE:FUNCTION``.
 
-It reads one task per line on standard input, runs it and writes one result per line on standard output, all
-in JSON. It ends when its input ends, even in the middle of a run: a worker never outlives its sweep. Output
-of a run goes to standard error.
+Its first line on standard output is ``{"ready": pid}``, or ``{"cannot": reason}`` if it cannot import
+FUNCTION. Then it reads one task per line on standard input, runs it and writes one result per line on
+standard output, all in JSON. It ends when its input ends, even in the middle of a run: a worker never
+outlives its sweep. Output of a run goes to standard error.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from outrider.sweep.tasks import Task
 
 Run = Callable[[Task], dict[str, Any]]
 """Function that flies a task and returns its summary: values of JSON, the same for the same task."""
-MOST_WORDS = 500
+_MAX_CHARACTERS = 500
+"""Length of the message of an error, at most."""
 
 
 def resolve(name: str) -> Run:
@@ -87,7 +89,7 @@ def _words(error: Exception) -> str:
     if place is not None:
         where = f" ({Path(place.tb_frame.f_code.co_filename).name}:{place.tb_lineno})"
     said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said[:MOST_WORDS]}{where}"
+    return f"{type(error).__name__}: {said[:_MAX_CHARACTERS]}{where}"
 
 
 if __name__ == "__main__":

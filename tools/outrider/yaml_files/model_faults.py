@@ -19,8 +19,9 @@ _KEY = "[key]"
 class _Place(NamedTuple):
     """The place to which an error's location leads.
 
-    ``path``: keys and indices in the file; ``parent``: schema of the containing value; ``at`` and
-    ``holder_at``: positions of the value and of its key; ``absent``: key or index that the tree lacks.
+    ``path``: keys and indices in the file; ``parent``: schema of the containing value; ``at``: position of
+    the value, or of the key if the key is invalid; ``holder_at``: position of the key, or of the value if it
+    has none; ``absent``: key or index that the tree lacks.
     """
 
     path: tuple[str | int, ...]
@@ -39,7 +40,11 @@ class _Place(NamedTuple):
 
 
 class _Union(NamedTuple):
-    """The outermost undecided union on a location: the member that the location names, and its depth."""
+    """The outermost union without a discriminator on the location of an error.
+
+    ``label``: the member of the union that the location names; ``place``: the place of the union; ``depth``:
+    the index of ``label`` in the location.
+    """
 
     label: str
     place: _Place
@@ -47,7 +52,7 @@ class _Union(NamedTuple):
 
 
 class _OfUnion(NamedTuple):
-    """An error inside such a union, and its place."""
+    """An error at or inside a union without a discriminator, and the place of the error."""
 
     union: _Union
     place: _Place
@@ -55,7 +60,10 @@ class _OfUnion(NamedTuple):
 
     @property
     def of_whole(self) -> bool:
-        """Whether the error is about the value as a whole: its kind is not that of this member."""
+        """Whether the error concerns the value itself and not a part of it.
+
+        Then the value does not fit the member. Errors raised by a validator of the model do not count.
+        """
         return len(self.error["loc"]) <= self.union.depth + 1 and self.error["type"] not in _OF_A_RULE
 
 
@@ -69,8 +77,10 @@ def _within(path: tuple[str | int, ...]) -> str:
 
 
 def model_flaws(tree: Tree, schema: Schema, errors: Iterable[ErrorDetails]) -> list[Flaw]:
-    """Return one flaw for each error; the errors of a union give one flaw.
+    """Return one flaw for each error.
 
+    Of the errors of a union without a discriminator only those of the member that fits best are returned, or
+    one flaw if the value fits no member.
     Errors at ``Broken`` values are skipped, because their faults are reported already.
     """
     placed = [(_locate(tree, schema, error["loc"]), error) for error in errors]
@@ -177,7 +187,7 @@ def _tag_flaw(place: _Place) -> Flaw:
 
 
 def _hint(place: _Place) -> str:
-    """Return a suggestion for a scalar of the wrong type."""
+    """Return a suggestion for a scalar that is not allowed, or an empty text."""
     tree, schema = place.tree, place.schema
     if not isinstance(tree, Scalar):
         return ""

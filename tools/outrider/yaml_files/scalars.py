@@ -1,7 +1,7 @@
 """Meaning of a plain YAML scalar by the core schema of YAML 1.2, except that leading zeros make text.
 
-So text that YAML 1.1 reads differently (``on``, ``010``, ``1:30``, ``1_000``) stays text, and never becomes a
-number unnoticed.
+Numbers that are not finite or out of range are errors. ``on``, ``010``, ``1:30`` and ``1_000``, which YAML
+1.1 reads as a boolean or as numbers, stay text. ``1e5`` and ``0o17`` are numbers here, and text in YAML 1.1.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ class ScalarError(ValueError):
 def resolve(text: str) -> Value:
     """Return the value of a plain scalar.
 
-    Raises ScalarError for NaN, infinities, floats out of range, and integers beyond 64 bits.
+    Raises ScalarError for NaN, infinities, floats out of range, and integers that do not fit into 64
+    bits with a sign or have more than 24 characters.
     """
     if text in _NULLS:
         return None
@@ -53,7 +54,7 @@ def resolve(text: str) -> Value:
 def _integer(text: str, base: int) -> int:
     value = int(text, base) if len(text) <= _LONGEST_INTEGER else 1 << 63
     if not -(1 << 63) <= value < 1 << 63:
-        raise ScalarError(f"{text[:40]} is too large; allowed: integers of 64 bits")
+        raise ScalarError(f"{text[:40]} is out of range; allowed: integers from −2^63 to 2^63 − 1")
     return value
 
 
