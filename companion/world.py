@@ -167,7 +167,10 @@ class World:
         places = None
         if config.avoidance != "certified":
             # A plan begins on the last plan, or at the vehicle if the vehicle has left the last plan.
-            places = prediction[:1] if view.own is None else np.stack([prediction[0], view.own.position])
+            places = prediction[:1]
+            if view.own is not None:
+                places = prediction[:2].copy()
+                places[1] = view.own.position
         obstacles = self.neighbours.obstacles(now, places)
         if len(self._moving):
             margins = field.margin(1), field.margin(2)

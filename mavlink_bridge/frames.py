@@ -20,7 +20,10 @@ from pymap3d.rcurve import meridian, transverse
 
 Array = npt.NDArray[np.float64]
 
+Point = tuple[float, float, float]
+
 _WGS84 = Ellipsoid.from_name("wgs84")
+_SEMI_MAJOR, _SEMI_MINOR = _WGS84.semimajor_axis, _WGS84.semiminor_axis
 _MAX_ITERATIONS = 8
 _CONVERGED_M = 1e-6
 # Swaps x and y and negates z; the matrix is its own inverse.
@@ -73,9 +76,10 @@ class FleetFrame:
         self.latitude = latitude
         self.longitude = longitude
         self.altitude = altitude
-        self._ecef = geodetic2ecef(latitude, longitude, altitude, _WGS84)
+        self._ecef = tuple(float(part) for part in geodetic2ecef(latitude, longitude, altitude, _WGS84))
         self._enu_of_ecef = np.array(uvw2enu(*np.eye(3), latitude, longitude), dtype=np.float64)
         self._enu_of_ecef.flags.writeable = False
+        self._axes: list[list[float]] = self._enu_of_ecef.tolist()
         north_radius = float(meridian(latitude, _WGS84)) + altitude
         east_radius = (float(transverse(latitude, _WGS84)) + altitude) * math.cos(math.radians(latitude))
         self._degrees_north, self._degrees_east = (
@@ -85,10 +89,28 @@ class FleetFrame:
 
     def to_enu(self, latitude: float, longitude: float, altitude: float) -> Array:
         """Return the position (3,), m, of a point given in degrees and m."""
-        x, y, z = geodetic2ecef(latitude, longitude, altitude, _WGS84)
-        x0, y0, z0 = self._ecef
-        enu: Array = self._enu_of_ecef @ (x - x0, y - y0, z - z0)
-        return enu
+        return np.array(self.to_east_north_up(latitude, longitude, altitude))
+
+    def to_east_north_up(self, latitude: float, longitude: float, altitude: float) -> Point:
+        """Return east, north and up, m, of a point given in degrees and m; NaN for an infinite one.
+
+        It is pymap3d's geodetic2ecef for one point, in floats: every position that is received passes here.
+        """
+        if not math.isfinite(latitude + longitude):
+            return math.nan, math.nan, math.nan
+        phi, lam = math.radians(latitude), math.radians(longitude)
+        sine, cosine = math.sin(phi), math.cos(phi)
+        radius = _SEMI_MAJOR**2 / math.hypot(_SEMI_MAJOR * cosine, _SEMI_MINOR * sine)
+        across = (radius + altitude) * cosine
+        x = across * math.cos(lam) - self._ecef[0]
+        y = across * math.sin(lam) - self._ecef[1]
+        z = (radius * (_SEMI_MINOR / _SEMI_MAJOR) ** 2 + altitude) * sine - self._ecef[2]
+        east, north, up = self._axes
+        return (
+            east[0] * x + east[1] * y + east[2] * z,
+            north[0] * x + north[1] * y + north[2] * z,
+            up[0] * x + up[1] * y + up[2] * z,
+        )
 
     def to_geodetic(self, enu: npt.ArrayLike) -> tuple[float, float, float]:
         """Return latitude °, longitude °, altitude m of a position (3,), m; accurate to 1 µm within 100 km.
@@ -104,7 +126,7 @@ class FleetFrame:
             latitude += missing[1] * self._degrees_north
             longitude += missing[0] * self._degrees_east
             altitude += missing[2]
-            x, y, z = self.to_enu(latitude, longitude, altitude).tolist()
+            x, y, z = self.to_east_north_up(latitude, longitude, altitude)
             missing = (east - x, north - y, up - z)
             if abs(missing[0]) + abs(missing[1]) + abs(missing[2]) < _CONVERGED_M:
                 if abs(latitude) > 90:
@@ -160,6 +182,16 @@ class LocalFrame:
     def velocity_to_local(self, enu: npt.ArrayLike) -> Array:
         """Convert free vectors (…, 3), velocities or accelerations, from fleet ENU to vehicle-local NED."""
         return np.asarray(enu, dtype=np.float64) @ self.rotation
+
+    def motion_to_local(
+        self, position: Array, velocity: Array, acceleration: Array
+    ) -> tuple[Point, Point, Point]:
+        """Convert a position (3,), m, and two free vectors (3,) from fleet ENU to vehicle-local NED."""
+        motion = np.empty((3, 3))
+        np.subtract(position, self.origin_fleet, out=motion[0])
+        motion[1], motion[2] = velocity, acceleration
+        one, two, three = (motion @ self.rotation).tolist()
+        return tuple(one), tuple(two), tuple(three)
 
     def yaw_to_fleet(self, yaw_ned: float) -> float:
         """Convert rad clockwise from local north to rad counter-clockwise from fleet east, in (−π, π]."""

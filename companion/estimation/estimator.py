@@ -148,11 +148,11 @@ class Estimator:
         """Refuse ``z``, or restart at it, with covariance ``first``, if enough refused measurements agree."""
         doubts = list(belief.doubts)
         witnesses = 1
-        for index, (since, x, witnesses) in enumerate(doubts):
+        for index, (since, x, earlier) in enumerate(doubts):
             dt = 1e-6 * (time - since)
             off = (z[axis] - x[axis] - dt * x[axis + 3] for axis in range(3))
             if sum(part * part for part in off) <= self._largest_innovation(time - since) ** 2:
-                witnesses = witnesses + 1
+                witnesses = earlier + 1
                 del doubts[index]
                 break
         if witnesses >= self._witnesses:

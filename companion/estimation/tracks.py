@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.config.estimation import TrackConfig
-from companion.estimation.estimator import Belief, Measured, Six, estimator
+from companion.estimation.estimator import Belief, Measured, Six, Three, estimator
 from companion.estimation.kalman_gains import model
 from companion.estimation.out_of_sequence import OutOfSequenceBuffer
 from companion.estimation.sender_clock import SenderClock
@@ -106,7 +106,8 @@ class Track:
         (``velocity_up``) the sign is corrected here. A measurement that is at most ``rewind_us`` older than
         the latest is inserted in time order. A duplicate with a stamp does not change the state.
         """
-        return self.take(received, measured(position, velocity, upward=self._config.velocity_up), stamp)
+        place, speed = position.tolist(), None if velocity is None else velocity.tolist()
+        return self.take(received, measured(place, speed, upward=self._config.velocity_up), stamp)
 
     def take(self, received: int, z: Measured | None, stamp: int) -> bool:
         """Add a measurement that ``measured`` has converted; return whether it was accepted."""
@@ -204,16 +205,16 @@ class Track:
         return self._rewind.belief
 
 
-def measured(position: Array, velocity: Array | None, *, upward: bool) -> Measured | None:
-    """Return the measurement of a position (3,) m and a velocity (3,) m/s or None, fleet-local ENU.
+def measured(position: Three, velocity: Three | None, *, upward: bool) -> Measured | None:
+    """Return the measurement of a position (m) and a velocity (m/s) or None, fleet-local ENU.
 
     Returns None for implausible values. ``upward``: the sender reports the vertical speed with the wrong
     sign.
     """
-    a, b, c = position.tolist()
+    a, b, c = position
     if velocity is None:
         return (a, b, c) if a * a + b * b + c * c <= _MAX_DISTANCE_M**2 else None
-    d, e, f = velocity.tolist()
+    d, e, f = velocity
     if not (a * a + b * b + c * c <= _MAX_DISTANCE_M**2 and d * d + e * e + f * f <= _MAX_SPEED_M_S**2):
         return None
     return a, b, c, d, e, -f if upward else f

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.goals.heading import Yaw
 from companion.values.horizon import Array, Horizon
 from mavlink_bridge.frames import LocalFrame
-from mavlink_bridge.messages import SetpointLocal, Source, Vector
+from mavlink_bridge.messages import SetpointLocal, Source
 
 NO_ACCELERATION: Array = np.zeros(3)
 """No compensation."""
@@ -51,6 +51,7 @@ def setpoint(
     if bias is not NO_ACCELERATION:
         most = np.maximum(np.abs(velocity), v_max)
         velocity = np.minimum(np.maximum(velocity + bias, -most), most)
+    place, speed, change = local.motion_to_local(motion.position, velocity, acceleration + compensation)
     return SetpointLocal(
         own,
         since_boot,
@@ -58,9 +59,9 @@ def setpoint(
         mavlink.MAV_COMP_ID_AUTOPILOT1,
         mavlink.MAV_FRAME_LOCAL_NED,
         mask,
-        _vector(local.position_to_local(motion.position)),
-        _vector(local.velocity_to_local(velocity)),
-        _vector(local.velocity_to_local(acceleration + compensation)),
+        place,
+        speed,
+        change,
         local.yaw_to_local(yaw.yaw),
         # NED yaw is clockwise: the rate changes sign with the frame.
         -yaw.rate,
@@ -76,7 +77,3 @@ def is_finite(message: SetpointLocal) -> bool:
         + message.yaw
         + message.yaw_rate
     )
-
-
-def _vector(v: Array) -> Vector:
-    return float(v[0]), float(v[1]), float(v[2])

@@ -29,9 +29,9 @@ from companion.values.horizon import Array, Horizon, HorizonTable, roll_out
 from companion.values.obstacles import Obstacles
 from companion.values.vectors import limit
 from mavlink_bridge.errors import PlanWireError
-from mavlink_bridge.frames import FleetFrame, ned_to_enu
+from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import GlobalPosition, Tunnel
-from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack_motion
 from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 
 _SYSTEM_IDS = 255
@@ -51,8 +51,8 @@ def _read(payload: bytes) -> tuple[int, Horizon]:
 
     If many companions share a process, each plan is decoded once.
     """
-    plan = unpack(payload)
-    horizon = roll_out(plan.epoch, plan.dt, plan.position_m, plan.velocity_m_s, plan.accelerations_m_s2)
+    plan = unpack_motion(payload)
+    horizon = roll_out(plan.epoch, plan.dt, plan.position, plan.velocity, plan.accelerations)
     horizon.knots.flags.writeable = False
     return plan.origin, horizon
 
@@ -60,8 +60,9 @@ def _read(payload: bytes) -> tuple[int, Horizon]:
 @lru_cache(maxsize=1024)
 def _placed(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measured | None:
     """Return the measurement in a message, None if invalid; each message is converted once per process."""
-    position = fleet.to_enu(message.latitude, message.longitude, message.altitude)
-    return measured(position, ned_to_enu(message.velocity_ned), upward=upward)
+    north, east, down = message.velocity_ned
+    place = fleet.to_east_north_up(message.latitude, message.longitude, message.altitude)
+    return measured(place, (east, north, -down), upward=upward)
 
 
 def fading(config: CompanionConfig) -> Array | None:
@@ -237,16 +238,16 @@ class Neighbours:
         steps = config.horizon.steps + 1
         self._update_rows()
         age = now - self._times
-        ids, states, times, since = self._ids, self._states, self._times, now - self._arrivals
+        ids, states, times, arrivals = self._ids, self._states, self._times, self._arrivals
         doubtful = self._uncertainty.systems(now)
         if places is not None and ids:
             near = self.relevance.near(places, states, age)
             for system in self._moving_obstacles | doubtful:
                 if system in self._rows:
                     near[self._rows[system]] = True
-            if not near.all():
+            if np.count_nonzero(near) < len(ids):
                 ids = tuple(compress(ids, near.tolist()))
-                age, states, times, since = age[near], states[near], times[near], since[near]
+                age, states, times, arrivals = age[near], states[near], times[near], arrivals[near]
         if not ids:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
         positions, trusted = self._table.positions(ids, now, now - stale)
@@ -254,13 +255,13 @@ class Neighbours:
         _extrapolate(states, age, config.neighbour.extrapolate_us, here)
         count, deviation = len(ids), self._max_plan_deviation
         further: Array | None = None
-        if silent.any():
+        if np.count_nonzero(silent):
             # Late: a message has arrived recently, but its date is old. A neighbour that has just fallen
             # silent is not late.
-            begins, late = positions[:, 0], silent & (since <= stale - config.neighbour.delay_us)
+            begins, late = positions[:, 0], silent & (now - arrivals <= stale - config.neighbour.delay_us)
             beside = late & (_within(begins, states[:, 0:3], deviation) | _within(begins, here, deviation))
             held = silent if config.guard.flown_on_us else late
-            if held.any():
+            if np.count_nonzero(held):
                 names, further = tuple(compress(ids, held.tolist())), np.zeros(count)
                 here[held], further[held] = self._held(
                     names, states[held], times[held], age[held], late[held]

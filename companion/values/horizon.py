@@ -43,14 +43,9 @@ class Horizon(NamedTuple):
 
     def at(self, time: int) -> Motion:
         """Return the motion at ``time`` (µs): the exact quadratic of the segment, not an interpolation."""
-        last = len(self.knots) - 1
-        index = min(max((time - self.epoch) // self.dt, 0), last)
-        s = (time - self.epoch - index * self.dt) * 1e-6
-        knot = self.knots[index]
-        p, v, a = knot[0:3], knot[3:6], knot[6:9]
-        if s < 0.0:
-            a = _ZERO
-        return Motion(p + s * (v + (0.5 * s) * a), v + s * a, a)
+        found = np.empty((3, 3))
+        _state(self.knots, time - self.epoch, self.dt, found)
+        return Motion(found[0], found[1], found[2])
 
     def positions(self, start: int, steps: int, dt: int) -> Array:
         """Return positions (steps, 3), m, at ``start + n·dt`` (µs), n = 0…steps − 1."""
@@ -59,8 +54,6 @@ class Horizon(NamedTuple):
         return found
 
 
-_ZERO = np.zeros(3)
-_ZERO.flags.writeable = False
 _NO_PLAN_US = 1 << 62
 
 
@@ -99,6 +92,19 @@ def _positions_of(knots: Array, last: int, elapsed: int, step: int, dt: int, fou
         half = 0.5 * max(s, 0.0)
         for i in range(3):
             found[n, i] = knots[k, i] + s * (knots[k, 3 + i] + half * knots[k, 6 + i])
+
+
+@kernel(VOID, array(2), INT, INT, output(2))
+def _state(knots: Array, elapsed: int, dt: int, found: Array) -> None:
+    """Write position, velocity and acceleration (3, 3) at ``elapsed`` (µs) after the first of the knots."""
+    k = min(max(elapsed // dt, 0), len(knots) - 1)
+    s = (elapsed - k * dt) * 1e-6
+    for i in range(3):
+        # Before its first knot a horizon has no acceleration.
+        a = knots[k, 6 + i] if s >= 0.0 else 0.0
+        found[0, i] = knots[k, i] + s * (knots[k, 3 + i] + (0.5 * s) * a)
+        found[1, i] = knots[k, 3 + i] + s * a
+        found[2, i] = a
 
 
 @kernel(VOID, array(2), INT, INT, INT, output(2))

@@ -166,8 +166,44 @@ def pack(plan: WirePlan) -> bytes:
         raise PlanWireError(f"out of range of the wire: {plan}") from None
 
 
+class PlannedMotion(NamedTuple):
+    """Plan in SI units: ``position`` (3,), m, and ``velocity`` (3,), m/s, at the epoch.
+
+    ``accelerations`` (N, 3), m/s²; ``epoch``, ``dt`` and ``origin`` as in ``WirePlan``.
+    """
+
+    epoch: int
+    dt: int
+    position: Array
+    velocity: Array
+    accelerations: Array
+    origin: int
+
+
+def unpack_motion(data: bytes) -> PlannedMotion:
+    """Decode a plan to SI units; raise PlanWireError for anything that ``pack`` cannot produce.
+
+    The numbers are those of the properties of ``WirePlan``.
+    """
+    epoch, dt, position, velocity, origin = _head(data)
+    return PlannedMotion(
+        epoch,
+        dt,
+        np.array(position, dtype=np.float64) * _position_unit(dt),
+        np.array(velocity, dtype=np.float64) * _velocity_unit(dt),
+        np.frombuffer(data, dtype="<i2", offset=_HEADER.size).reshape(-1, 3) * 1e-3,
+        origin,
+    )
+
+
 def unpack(data: bytes) -> WirePlan:
     """Decode the plan in a TUNNEL payload; raise PlanWireError for anything that ``pack`` cannot produce."""
+    epoch, dt, position, velocity, origin = _head(data)
+    return WirePlan(epoch, dt, position, velocity, tuple(_KNOT.iter_unpack(data[_HEADER.size :])), origin)
+
+
+def _head(data: bytes) -> tuple[int, int, Integers, Integers, int]:
+    """Return epoch, dt, position, velocity and origin of a plan in a TUNNEL payload; check its length."""
     knots, rest = divmod(len(data) - _HEADER.size, _KNOT.size)
     if rest or not 0 <= knots <= KNOTS:
         raise PlanWireError(f"{len(data)} bytes are not a plan")
@@ -176,12 +212,9 @@ def unpack(data: bytes) -> WirePlan:
         raise PlanWireError(f"kind {kind} is not a plan of kind {KIND}")
     if steps == 0:
         raise PlanWireError("a plan with dt = 0")
-    vx, vy, vz = (int.from_bytes(velocity[at : at + 3], "little", signed=True) for at in (0, 3, 6))
-    return WirePlan(
-        int.from_bytes(epoch, "little"),
-        steps * STEP,
-        (px, py, pz),
-        (vx, vy, vz),
-        tuple(_KNOT.iter_unpack(data[_HEADER.size :])),
-        origin,
+    speed = (
+        int.from_bytes(velocity[0:3], "little", signed=True),
+        int.from_bytes(velocity[3:6], "little", signed=True),
+        int.from_bytes(velocity[6:9], "little", signed=True),
     )
+    return int.from_bytes(epoch, "little"), steps * STEP, (px, py, pz), speed, origin

@@ -108,6 +108,16 @@ def test_where_the_model_would_allow_anything_the_jump_is_what_counts():
         assert track.measure(START + 400_000, np.zeros(3), np.array([5.0, 0.0, 0.0])) == passes
 
 
+def test_measurements_that_contradict_each_other_do_not_add_up():
+    """Two pairs of refused measurements, each of which agrees only in itself, are not three witnesses."""
+    track = Track(TrackConfig(witnesses=3))
+    for k in range(10):
+        track.measure(START + k * PERIOD, np.zeros(3), np.zeros(3))
+    for k, x in enumerate((50.0, 50.0, -80.0, -80.0), 10):
+        assert not track.measure(START + k * PERIOD, np.array([x, 0.0, 0.0]), np.zeros(3))
+    assert track.measure(START + 14 * PERIOD, np.array([-80.0, 0.0, 0.0]), np.zeros(3))
+
+
 @pytest.mark.parametrize("witnesses", [1, 2, 3, 5])
 def test_a_jump_that_persists_is_believed_with_as_many_witnesses_as_are_set(witnesses):
     track = Track(TrackConfig(witnesses=witnesses))
