@@ -126,7 +126,7 @@ class Companion:
 
     @property
     def bad_frames(self) -> int:
-        """Number of frames, on all links, that the codec could not decode."""
+        """Number of false starts, wrong checksums and invalid values in the received bytes of all links."""
         return sum(codec.counters.bad for codec in self._codecs.values())
 
     def use(self, methods: tuple[MethodName, ...]) -> None:

@@ -64,7 +64,7 @@ class View(NamedTuple):
 def reach(config: CompanionConfig) -> float:
     """Return the largest distance (m) from the own horizon at which an obstacle has an effect.
 
-    It covers the field and the tangential band, both extended for closing at v_max.
+    It covers the field and the tangential band, both extended for closing at the largest component of v_max.
     """
     field, band, speed = config.field, config.tangential, max(config.limits.v_max)
     stopping = 0.0 if field.braking is None else speed**2 / (2.0 * field.braking) + field.reaction * speed

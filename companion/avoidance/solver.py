@@ -1,9 +1,9 @@
-"""PIQP solver: set up once, then only vectors are updated.
+"""PIQP solvers: set up once, with updates of the vectors only (``QpSolver``), or per QP (``solve_once``).
 
-One dense QP of n variables is used for each axis in turn. Choices confirmed by measurement: no preconditioner
-(with scaling on, a wrong update can return SOLVED with a wrong result), the duality gap is checked, absent
-bounds are infinities, ``QpSolver`` validates shapes because PIQP does not raise on them, and results are
-copied because the next solve overwrites them.
+The field uses one dense ``QpSolver`` of n variables for each axis in turn. Choices confirmed by measurement:
+no preconditioner (with scaling on, a wrong update can return SOLVED with a wrong result), the duality gap is
+checked, absent bounds are infinities, ``QpSolver`` validates shapes because PIQP does not raise on them, and
+results are copied because the next solve overwrites them.
 """
 
 from __future__ import annotations

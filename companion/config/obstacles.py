@@ -1,4 +1,4 @@
-"""Settings of obstacles that every companion knows."""
+"""Settings of obstacles: fixed, moving, detected by sensors, and other traffic."""
 
 from __future__ import annotations
 

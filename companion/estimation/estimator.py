@@ -49,8 +49,8 @@ class RefusedMeasurement(NamedTuple):
 class Belief(NamedTuple):
     """Filter state of one sender: state vector, covariance P (2, 2) of each axis row by row, and turn rate.
 
-    ``time``: when the last accepted measurement was true, µs; ``refused``: number of measurements that were
-    not accepted.
+    ``time``: when the last accepted measurement was true, µs; ``doubts``: the hypotheses that contradict the
+    state; ``refused``: number of measurements that were not accepted.
     """
 
     time: int

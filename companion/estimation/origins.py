@@ -20,9 +20,9 @@ class Origins:
     def counts(self, now: int, origin: GpsGlobalOrigin) -> bool:
         """Return whether ``origin``, received at ``now`` (µs), is to be used.
 
-        It is not to be used if its time stamp is earlier than that of the last used origin and this one was
-        received at most 2 s before: it is then late or resent, and no later message would restore the newer
-        origin. An origin without a time stamp (0) is always used.
+        It is not to be used if its time stamp is earlier than that of the last used origin, and the last used
+        origin was received at most 2 s before: it is then late or resent, and no later message would restore
+        the newer origin. An origin without a time stamp (0) is always used.
         """
         if 0 < origin.time < self._time and now - self._received <= _MAX_OVERTAKING_US:
             return False

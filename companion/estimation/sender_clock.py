@@ -2,10 +2,10 @@
 
 The delay of a message varies; its stamp (``time_boot_ms`` of GLOBAL_POSITION_INT and LOCAL_POSITION_NED) does
 not. The *lag* arrival − stamp is the offset between the two clocks plus the delay. The estimator keeps a line
-below all lags: the offset plus the least delay, which is a setting. The age of a message is this least delay
-plus the part of its lag above the line. One-way messages cannot distinguish a link that became slow from a
-clock that stood still. So the line falls to any lower lag at once, and rises no faster than clocks drift:
-**a growing delay never makes a message younger**.
+(over the arrival time) at or below all lags: the estimated offset plus the least delay, which is a setting.
+The age of a message is this least delay plus the part of its lag above the line. One-way messages
+cannot distinguish a link that became slow from a clock that stood still. So the line falls to any lower lag
+at once, and rises no faster than clocks drift: **a growing delay never makes a message younger**.
 
 A sender that answers requests allows the distinction: the clock value in an answer was shown after the
 request left, so the offset is at least the request's time minus that stamp, however slow the way back. The
@@ -13,7 +13,7 @@ line is raised to this offset plus the least delay at once; as long as answers a
 raises it. A message's age is then never understated, and overstated by no more than the time that the request
 took.
 
-Without answers, two explanations are accepted after long evidence. First, a lag that has grown steadily for
+Without answers, two explanations are accepted after long evidence. First, a lag that has changed steadily for
 half a minute is attributed to a clock of another rate, such as a simulator's (1 % and more); the rate is that
 of the line below the lags as defined by Moon, Skelly and Towsley ("Estimation and removal of clock skew from
 network delay measurements", 1999). Second, if for a whole minute no message was young enough to be useful,
@@ -56,7 +56,7 @@ _UNUSABLE_US = 400_000
 With messages of that age the sender would be unusable.
 """
 _CLOCK_STEP_US = 2 * _SECOND_US
-"""Messages do not overtake each other by more, and no lag falls by more.
+"""Messages do not overtake each other by more than this, and no lag falls by more than this.
 
 A larger step means that the clock was set or that the sender restarted.
 """
@@ -335,7 +335,7 @@ class SenderClock:
             self._forget()
             return
         if len(pieces) == 1:
-            # Until then the line was kept level; it may have risen since.
+            # During the first piece the line is kept level; the drift of this time is added here.
             self._line += _DRIFT * (received - pieces[0].received)
         recent = list(islice(pieces, max(len(pieces) - _MIN_PIECES_FOR_RATE, 0), None))
         learnt = _steady_rate(recent)

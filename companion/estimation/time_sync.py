@@ -19,7 +19,7 @@ _NS_PER_US = 1000
 The last three digits of a request's time (ns) are its sender's component id: they identify its response.
 """
 _LATE_US = 20_000
-"""Requests are sent if even the fastest of the last few messages has a larger delay."""
+"""Requests are sent if ``late`` is larger, the delay of the fastest of the last few messages."""
 _PERIOD_US = 200_000
 """Time between two requests."""
 _MAX_OPEN_REQUESTS = 32
@@ -45,7 +45,7 @@ class RoundTrips:
         self._since: int | None = None
 
     def due(self, now: int, late: int) -> list[Timesync]:
-        """Return the request due at ``now`` (µs), if any; ``late``: delay (µs) of the messages."""
+        """Return the request due at ``now`` (µs), if any; ``late`` (µs): ``SenderClock.late``."""
         if late <= _LATE_US:
             self._since = None
             return []

@@ -11,7 +11,7 @@ from mavlink_bridge.messages import CommandAck, CommandLong, Message, Source
 _RETRY_US = 500_000
 """µs between two transmissions of an unacknowledged command."""
 _EXPIRY_US = 15_000_000
-"""µs after which ``call`` sends an acknowledged command again; longer than a take-off."""
+"""µs from the transmission of an acknowledged command until ``call`` repeats it; longer than a take-off."""
 
 _MAX_REFUSALS = 16
 
@@ -79,9 +79,9 @@ class Commands:
     def call(self, now: int, command: int, params: tuple[float, ...]) -> list[Message]:
         """Return the command to send at ``now`` (µs), or an empty list.
 
-        It is not sent if it was acknowledged in the last 15 s, was sent less than half a second ago, or must
-        wait for its turn: COMMAND_ACK contains the command id alone, so only one command with the same id may
-        be open at a time.
+        It is not sent if it was acknowledged and sent at most 15 s ago, was sent less than half a second ago,
+        or must wait for its turn: COMMAND_ACK contains the command id alone, so only one command with the
+        same id may be open at a time.
         """
         key = _key(command, params)
         if key in self._acknowledged and now - self._sent.get(key, now) > _EXPIRY_US:

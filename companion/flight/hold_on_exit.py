@@ -23,7 +23,7 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 
 _RETRY_US, _ACCEPTED_RETRY_US = 100_000, 1_500_000
-"""µs until the next request, normally and after an accepted one: a heartbeat reports the mode within that."""
+"""µs until the next request: normally, and after an accepted one, to wait for a heartbeat with the mode."""
 _TIMEOUT_US = 3_000_000
 """µs from the first step until the attempt is given up."""
 _RECEIVED = frozenset((mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_COMMAND_ACK))
@@ -69,7 +69,7 @@ class HoldOnExit:
 
     @property
     def over(self) -> bool:
-        """Whether the attempt is over: hold mode, disarmed, another controller, or no success in 3 s."""
+        """Whether the attempt is over: hold mode, disarmed, taken over, never heard, or no success in 3 s."""
         return bool(self.said)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:

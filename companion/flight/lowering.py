@@ -1,8 +1,9 @@
 """Configured limits, lowered to what the autopilot can follow with its parameters.
 
 A set-point beyond the firmware's limits is followed late: the vehicle is then not where its plan says, and
-the separation of the plans is of no use. Jerk bounds apply where the firmware enforces them on set-points
-(``Limits.shaped``). The bounds on the horizontal norms of jerk and speed are divided between the two axes.
+the separation of the plans is of no use. The jerk is lowered only where the firmware bounds it on set-points
+(``Limits.shaped``); elsewhere ``j_max`` stays as configured. The bounds on the horizontal norms of jerk and
+speed are divided between the two axes.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ _TOLERANCE = 1e-3
 _MIN_JERK, _MIN_ACCELERATION, _MIN_TILT_DEG = 1.0, 1.0, 10.0
 """The least values with which an escort is flown: m/s³, m/s² and degrees.
 
-With 1 m/s³ a vehicle needs 1.9 m to stop from a walker's 1.5 m/s, and 6.6 m from 3.5 m/s.
+With 1 m/s³, if no other limit is reached, a vehicle needs 1.8 m to stop from a walker's 1.5 m/s, and 6.5 m
+from 3.5 m/s.
 """
 _MIN_SPEED, _MIN_VERTICAL_SPEED, _MIN_POSITION_GAIN, _MIN_VELOCITY_GAIN = 1.0, 0.3, 0.3, 0.5
 """The least values with which an escort is flown: m/s, m/s up and down, 1/s and 1/s.

@@ -16,7 +16,7 @@ from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message
 
 _GLOBAL = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _MAX_ALTITUDE = 1e5
-"""m, bound on the magnitude of altitudes; its comparison also rejects NaN."""
+"""m, bound on the magnitude of altitudes; the comparison with it also rejects NaN."""
 
 
 class Orders:
@@ -65,8 +65,8 @@ class Orders:
     def _reposition(self, order: CommandInt) -> bool:
         """Set the goal to a global position, altitude above mean sea level; return whether it is accepted.
 
-        Another frame, an invalid position, a position outside the box, and a task other than "goto" are
-        refused.
+        The order is refused if its frame is not one of ``_GLOBAL``, if the position is invalid or outside the
+        box of ``limits``, and if the task is not "goto".
         """
         latitude, longitude = order.x * 1e-7, order.y * 1e-7
         if order.frame not in _GLOBAL or abs(latitude) > 90.0 or abs(longitude) > 180.0:

@@ -1,9 +1,9 @@
 """Position quality of the own autopilot, from its GPS and its estimator, and a bound on the error.
 
 Without GPS an estimator dead-reckons on its accelerometers and reports its estimated position as before; it
-reports the loss of position after 5 s (PX4) or 7 s (ArduPilot), and then its failsafe acts. GPS_RAW_INT (24)
-shows the loss at once. The flags of EKF_STATUS_REPORT (193) and ESTIMATOR_STATUS (230) show it too. A ratio
-of innovation to gate of 1 or more means that the estimator rejects GPS and dead-reckons.
+reports the loss of position after 5 s (PX4) or 7 s (ArduPilot), and then the autopilot's failsafe acts.
+GPS_RAW_INT (24) shows the loss at once. The flags of EKF_STATUS_REPORT (193) and ESTIMATOR_STATUS (230) show
+it too. A ratio of innovation to gate of 1 or more means that the estimator rejects GPS and dead-reckons.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ _CONVERGENCE_US = 2_000_000
 class Positioning:
     """Position quality of one autopilot. A message counts as received at the time of the last ``tick``.
 
-    The loss of a fix is reported only after a first fix: a vehicle with cameras may have no GPS at all.
+    The loss of the fix, or of the estimator's absolute position, is reported only after it was present once:
+    a vehicle with cameras may have no GPS at all.
     """
 
     def __init__(self) -> None:
@@ -45,10 +46,10 @@ class Positioning:
             fix = message.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX
             self._fix = fix if fix or self._fix is not None else None
         elif isinstance(message, EkfStatus | EstimatorStatus):
-            # EKF_POS_HORIZ_ABS is the same bit.
+            # EKF_POS_HORIZ_ABS of EKF_STATUS_REPORT is the same bit.
             absolute = bool(message.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS)
             self._absolute = absolute if absolute or self._absolute is not None else None
-            # NaN means not tested.
+            # ``horizontal`` is NaN if the estimator has not tested the innovation; NaN fails the comparison.
             self._refused = absolute and message.horizontal >= _REJECTS
             if isinstance(message, EstimatorStatus):
                 self._accuracy = message.horizontal_accuracy
@@ -85,7 +86,11 @@ class Positioning:
         return min(self._largest_error, _LARGEST_RADIUS)
 
     def _estimated(self) -> float:
-        """Return the error (m) by elapsed time, or by the estimator's own report if that is larger."""
+        """Return the error (m) of dead reckoning since the loss of position.
+
+        It is computed from the elapsed time. If twice the growth of the accuracy (m) that the estimator
+        reports is larger, it is that growth times two.
+        """
         lost_at = self._now if self._lost_at is None else self._lost_at
         dead_reckoned = 0.5 * _DEAD_RECKONING_ERROR * (1e-6 * (self._now - lost_at)) ** 2
         if (

@@ -1,8 +1,8 @@
 """Set-points: consistent position, velocity, acceleration and yaw at a bounded look-ahead of the horizon.
 
-The paper sends the last state, 1.6 s ahead: 8 m at 5 m/s. A cascaded position controller that follows such a
-point exceeds its speed limit. A look-ahead equal to the link's delay makes the set-point correct when it
-arrives; 1 600 000 µs is the paper's choice.
+The paper sends the last state, 1.6 s ahead: 8 m at 5 m/s. A cascaded position controller that follows a point
+so far ahead exceeds its speed limit. A look-ahead (``setpoint_lead_us``) equal to the link's delay makes the
+set-point correct when it arrives; the paper's choice is 1 600 000 µs.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def setpoint(
     It contains the state of ``horizon`` at ``time`` (µs), and ``yaw``. ``since_boot`` (µs): time_boot_ms;
     ``own`` is the sender, and its system id the target's; ``mask`` is POSITION_TARGET_TYPEMASK.
     ``compensation`` (3,), m/s², fleet-local ENU, is added to the acceleration. ``bias`` (3,), m/s, is added
-    to the velocity (``tracking``); the sum is then clipped on each axis to the larger of ``v_max`` (3,) and
-    the planned speed. The acceleration is that of the horizon ``lead`` µs later.
+    to the velocity (see ``tracking.py``); the sum is then clipped on each axis to the larger of ``v_max``
+    (3,) and the planned speed. The acceleration is that of the horizon ``lead`` µs later.
     """
     motion = horizon.at(time)
     acceleration = horizon.at(time + lead).acceleration if lead else motion.acceleration

@@ -32,7 +32,7 @@ _NAN = float("nan")
 _ARM_REPORT_US = 2_000_000
 """µs after the last arm command during which a heartbeat may still report the vehicle as disarmed."""
 _MODE_REPORT_US = 1_500_000
-"""µs after an accepted mode command during which the mode is assumed without a heartbeat."""
+"""µs after the transmission of an accepted mode command; so long the mode is assumed without a heartbeat."""
 _LEAVE_TIMEOUT_US = 5_000_000
 """µs after landing during which the hold mode is requested."""
 
@@ -149,9 +149,9 @@ class Pilot:
         """Accept the operator's go: climb to ``height`` (m) above the start; return whether it is accepted.
 
         A vehicle that flies already is taken over where it is. In escort, hold and return the escort
-        continues, whatever the height. Otherwise the go is refused for a height outside 0.5…120 m, during
-        settling and landing and after it, during take-off for another height, and before it if the
-        autopilot's parameters do not permit an escort.
+        continues, whatever the height. In all other phases the go is refused for a height outside 0.5…120 m,
+        during settling, during landing and after it, during take-off for another height, and before take-off
+        if the autopilot's parameters do not permit an escort.
         """
         if self.phase in (Phase.HOLD, Phase.RETURN, Phase.ESCORT):
             self.phase, self._returning = Phase.ESCORT, False
@@ -180,7 +180,10 @@ class Pilot:
         return self.phase is Phase.HOLD
 
     def come_back(self) -> bool:
-        """Return to the start and land there, by order of the operator; return whether it is accepted."""
+        """Return to the start and land there, by order of the operator; return whether it is accepted.
+
+        During settling and landing the order is accepted but has no effect.
+        """
         if self.phase in (Phase.ESCORT, Phase.HOLD):
             self.phase, self._returning = Phase.RETURN, True
         return self.phase in (Phase.RETURN, Phase.SETTLE, Phase.LAND)
@@ -200,10 +203,11 @@ class Pilot:
         A vehicle under way first comes to a hover clear of the others, because an autopilot that lands does
         not avoid other vehicles. The order is refused if another controller has the vehicle, or if, before
         the take-off, the vehicle flies in a mode that is neither the guided nor the hold mode. If the
-        autopilot is silent before the take-off, the order only cancels a waiting go.
+        autopilot is silent before the take-off, the order only cancels a waiting go, and is refused without
+        one.
         """
         if self.phase in STEERED:
-            # A vehicle that is still on its way back lands where it is: that is no return.
+            # A vehicle that is still on its way back lands where it is: this landing is not a return.
             self._returning = self._returning and self.phase is not Phase.RETURN
             self.phase = Phase.SETTLE
         elif self.phase is Phase.PREPARE:

@@ -14,13 +14,17 @@ from companion.values.horizon import Array
 from mavlink_bridge.messages import Message
 
 _REST_SPEED, _REST_TIME_US = 0.3, 2_000_000
-"""m/s and µs: a vehicle slower than this in the air for so long has finished its take-off."""
+"""m/s and µs: a vehicle in the air that is slower for so long has finished its take-off.
+
+It must be above half of the requested height.
+"""
 _RISEN_SHARE = 0.7
 """Share of the requested height above which the climb may be over and the mode may have changed."""
 _ESCORT_SHARE, _FLOOR_CLEARANCE = 0.6, 0.2
 """Share of the requested height, and distance (m) above the lowest height of plans.
 
-An escort may begin during the climb above both: the autopilot takes up to 3 s for the slow end.
+An escort may begin during the climb above both heights: the autopilot takes up to 3 s for the slow end of the
+climb.
 """
 _MAX_OVERSHOOT, _MAX_ESCORT_SPEED = 0.3, 3.0
 """m above the requested height, and m/s, beyond which the escort may not begin during the climb."""
@@ -108,9 +112,9 @@ class Takeoff:
         """Return whether the take-off is over.
 
         It is over if the vehicle is high and slow enough for plans to take over, if it is at rest within
-        0.3 m of the requested height, or if it has been at rest for 2 s above half of it. The last condition
-        is needed because the estimated height may have drifted by more than 0.3 m: the autopilot measures its
-        height from its own origin.
+        0.3 m of the requested height, or if it has been at rest for 2 s above half of that height. The last
+        condition is needed because the estimated height may have drifted by more than 0.3 m: the autopilot
+        measures its height from its own origin.
         """
         speed = float(abs(own.velocity).max())
         at_rest = speed < _REST_SPEED

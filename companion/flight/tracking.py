@@ -11,11 +11,12 @@ with the reference (p_r, v_r, a_r), the compensations c and b that were sent and
 firmware's loops; a low-pass of time constant ``lag`` stands for the attitude loop. ArduPilot does not follow
 the set-point itself but a trajectory that follows the set-point with bounded jerk: then (p_r, v_r, a_r + c)
 are replaced by that trajectory, which is predicted as well. The difference between the measured and the
-predicted velocity is attributed to the disturbance d = κ v + w. κ, the drag per speed, is estimated from the
-correlation of d with the velocity (a Kalman filter of one state); w is the residual. The compensation
-c = κ (v_r + b + lag · a_r) + ρ w is added to the set-point's acceleration. If the vehicle does not respond to
-c, the observer takes the missing acceleration for a disturbance, and c would sustain itself; with ρ < 1 it
-decays. The drag term follows the reference and needs no such factor; only b feeds measurements back into it.
+predicted velocity is attributed to the disturbance d = κ v + w, the deceleration by drag and wind. κ, the
+drag per speed, is estimated from the correlation of d with the velocity v (a Kalman filter of one state); w
+is the residual. The compensation c = κ (v_r + b + lag · a_r) + ρ w is added to the set-point's acceleration.
+If the vehicle does not respond to c, the observer takes the missing acceleration for a disturbance, and c
+would sustain itself; with ρ < 1 it decays. The drag term follows the reference and needs no such factor; only
+b feeds measurements back into it.
 
 PX4's position loop is proportional. An offset of the estimated velocity, as GNSS causes for seconds, puts the
 vehicle offset/k_p beside its set-point for as long. The offset is the estimated velocity minus the rate of
@@ -71,9 +72,9 @@ class Errors:
         self.worst = max(self.worst, error)
 
     def percentile(self, share: float) -> float | None:
-        """Return the error (m) that ``share`` (0…1) of the errors do not exceed; None without any error.
+        """Return the error (m) that ``share`` (0…1) of the errors do not exceed; None before the first error.
 
-        It is rounded up to 1 cm, and at most 5.01 m even if errors are larger.
+        It is rounded up to 1 cm, but at most ``worst``, and at most 5.01 m even if errors are larger.
         """
         count = int(self._counts.sum())
         if not count:
@@ -111,7 +112,7 @@ class Tracking:
         self._model_acceleration: Array = np.zeros(2)
         # Trajectory that the autopilot follows: rows are position and velocity relative to the reference.
         self._relative: Array = np.zeros((2, 2))
-        # Its acceleration; without shaping the acceleration of the set-point.
+        # Acceleration of this trajectory; for an autopilot without one, the acceleration of the set-point.
         self._feedforward: Array = np.zeros(2)
         # Running means; rows are velocity and disturbance.
         self._means: Array = np.zeros((2, 2))

@@ -4,8 +4,8 @@ The paper's destination is the nearest point of the surface (Sec. III-B). Vehicl
 then have their destinations side by side, and only the field separates them. With ``spread`` the destination
 is turned about the target's vertical towards even bearings: K vehicles in the order of their bearings, 2π/K
 apart, all turned together so that the sum of the squares of their turns is least. The order is kept, so paths
-do not cross; no message is needed except positions. A vehicle whose place is far round the target flies there
-outside the surface.
+do not cross; no message is needed except the shared positions and plans. A vehicle whose place is far round
+the target flies there outside the surface.
 """
 
 from __future__ import annotations

@@ -26,7 +26,11 @@ _RETURNED_WITHIN_M, _RETURNED_BELOW_M_S = 0.5, 0.5
 The distance is also the least decrease that counts as progress.
 """
 _LANE_TOLERANCE_M, _NO_LANE_WITHIN_M = 1.0, 2.0
-"""A vehicle sets off for its start when it is at most the first below its lane, or within the second."""
+"""m. The lane of a returning vehicle is the height at which it flies to its start.
+
+It sets off when it is at most the first value below its lane, or less than the second value horizontally from
+its start.
+"""
 _BLOCKED_WITHIN_M, _NO_PROGRESS_TIMEOUT_US = 5.0, 10_000_000
 """A vehicle within this distance of its start that has come no nearer for this time is back, too."""
 
@@ -83,14 +87,20 @@ class Goals:
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self.goal: Array | None = None
-        """Ordered goal (3,) of the task ``goto``, m, fleet-local ENU; None for where steering began."""
+        """Ordered goal (3,) of the task ``goto``, m, fleet-local ENU.
+
+        None: the goal is the position where steering began.
+        """
 
     def begin(self, position: Array) -> None:
         """Record that steering begins, for the first time or again, at ``position`` (3,), m."""
         self._began = position
 
     def forget(self, view: View) -> None:
-        """Discard the state of an earlier phase, and the position held while the target was lost."""
+        """Discard the state of an earlier phase.
+
+        In an escort with a target, discard also the position held while there was no target.
+        """
         phase = self._pilot.phase
         if phase is not self._phase:
             self._phase, self._held = phase, None
@@ -198,7 +208,8 @@ class Goals:
     def _above_target(self, system: int) -> float:
         """Return the climb (m) from the surface's lowest point to where the target no longer repels.
 
-        Otherwise the target could push a returning vehicle up into the lane above.
+        All lanes are raised by this climb, because the target could push a vehicle in a lower lane up into
+        the lane above.
         """
         config = self._config
         if config.task != "escort" or config.target_d_safe is None:
@@ -209,9 +220,10 @@ class Goals:
     def _way_back(self, now: int, measured: Motion) -> Array:
         """Return the place (3,), m, to return to: above the start.
 
-        Its height is the one at the order to return plus the vehicle's lane. It is clipped to the box. A
-        vehicle with a lane climbs to it first: lanes separate the vehicles only once they have been reached.
-        The pilot receives a report when the vehicle is there, or when it is near and comes no nearer.
+        Its height is the one at the order to return plus ``_lane``. The place is clipped to the box. A
+        vehicle with a lane climbs to the lane first: lanes separate the vehicles only once they have been
+        reached. The pilot receives a report when the vehicle is there, or when it is near and comes no
+        nearer.
         """
         start = self._pilot.start
         if start is None:

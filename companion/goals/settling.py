@@ -33,7 +33,8 @@ class Settling:
         """Return the place (3,), m, to go to at ``now`` (µs).
 
         It is where braking from the first call on ends, clipped to the box; or a place beside a near
-        obstacle, which may be a landed vehicle and stay. The vehicle waits for an obstacle that passes.
+        obstacle, which may be a landed vehicle that stays there. The vehicle first waits for up to 5 s for an
+        obstacle that passes.
         """
         config, here = self._config, measured.position
         speed = float(np.linalg.norm(measured.velocity))

@@ -39,9 +39,9 @@ class MovingObstacles:
         """Return ``others`` with the configured sizes of the moving obstacles among them.
 
         ``d_min`` and ``d_safe`` (m, for a point) grow by the radius and ``margin``. A post is placed at the
-        point of its axis nearest to the own ``prediction`` (N + 1, 3). Where the radius in ``others`` exceeds
-        the margin of ``vehicles`` (m), the excess is the uncertainty of the position, by which the obstacle
-        is enlarged.
+        point of its axis nearest to the own ``prediction`` (N + 1, 3). ``vehicles`` (m) is the margin that
+        ``others`` contains as the radius of a vehicle; where a radius exceeds it, the excess is the
+        uncertainty of the position, by which the obstacle is enlarged.
         """
         found = [(j, self._rows[name]) for j, name in enumerate(others.ids) if name in self._rows]
         if not found:

@@ -132,7 +132,7 @@ class Neighbours:
                 clock.brief = value
 
     def receive_position(self, now: int, message: GlobalPosition) -> None:
-        """Receive a neighbour's GLOBAL_POSITION_INT; the own echo is ignored."""
+        """Receive a neighbour's GLOBAL_POSITION_INT; one with the own system id is ignored."""
         system, component = message.source
         if system == self._system:
             return
@@ -227,12 +227,11 @@ class Neighbours:
         With ``places`` (P, 3) only those are returned that may affect a plan that begins at one of them.
 
         A neighbour that falls silent remains an obstacle at its last position, extrapolated for a bounded
-        time. With ``guard.flown_on_us`` its vehicle may have stopped, or its autopilot
-        may have flown on: the obstacle then covers the
-        whole path between (``flown_on``). A measurement with an old
-        date that arrived only now was delayed, or is dated by a clock that has restarted and is not
-        synchronised yet: then both its reported and its extrapolated position are covered, and a plan that
-        passes one of them is accepted.
+        time. With ``guard.flown_on_us`` the vehicle may have stopped, or its autopilot may have flown on: the
+        obstacle then covers the whole path between (``flown_on``). A measurement with an old date that
+        arrived only now was delayed, or is dated by a clock that has restarted and is not synchronised yet:
+        then the obstacle covers both the reported and the extrapolated position, unless the neighbour's plan
+        is near one of them at ``now``; that plan is then used.
         """
         config, stale = self._config, self._config.guard.plan_stale_us
         steps = config.horizon.steps + 1
@@ -304,7 +303,7 @@ class Neighbours:
         """Return system id and distance (m) of the neighbour nearest to the ``own`` position.
 
         It is the distance to the extrapolated track. Returns None without an own state, without
-        ``guard.near`` and without neighbours.
+        ``guard.near`` or without neighbours.
         """
         if own is None or self._config.guard.near is None or not self._ids:
             return None
@@ -418,9 +417,10 @@ def _align(
     """Replace planned ``positions`` (M, N + 1, 3) of neighbours by measured ones where plans do not count.
 
     A plan is no longer ``trusted`` (M,) if it is further than ``deviation`` (m) from the measured place
-    ``here`` (M, 3). A vehicle beside a trusted plan returns to it by the shares ``fading`` (N + 1,);
-    an empty one stands for none. Without a trusted plan a neighbour rests; if its state is at most ``most``
-    (µs) old, it moves on at constant velocity, with ``step`` (s) between positions.
+    ``here`` (M, 3). A vehicle beside a trusted plan returns to it by the shares ``fading`` (N + 1,); if these
+    are empty, or the vehicle is ``silent`` (M,), its plan is used as it is. Without a trusted plan a
+    neighbour rests; if its state is at most ``most`` (µs) old, it moves on at constant velocity, with
+    ``step`` (s) between positions.
     """
     off = np.empty(3)
     for j in range(len(positions)):

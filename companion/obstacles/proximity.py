@@ -105,8 +105,9 @@ class Proximity:
     ) -> None:
         """Receive a message that arrived at ``now`` and was true at ``when`` (µs).
 
-        ``place`` (3,): the vehicle's position then; ``zero`` (rad, ENU): the direction from which its angles
-        count clockwise; ``known`` (K, 3): positions of neighbours, whose returns are ignored.
+        ``place`` (3,): the vehicle's position then; ``zero`` (rad, ENU): the direction from which the
+        message's angles count clockwise; ``known`` (K, 3): positions of neighbours, whose returns are
+        ignored.
         """
         sensor = scan.source, scan.sensor
         look = _Look(*sensor, scan.frame, scan.offset, scan.increment)

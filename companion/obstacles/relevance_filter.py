@@ -1,11 +1,12 @@
 """Relevance filter: skips messages of neighbours that are too distant to affect the own plans.
 
 The bound: a neighbour affects a vehicle's plan if, at some time within the horizon H, it is nearer than
-``reach``: the distance at which the field, the band and the angles act when closing at c, the sum of both
-speeds. Neither vehicle is faster than v, the norm of ``limits.v_max``, so c = 2 v. Consider a neighbour at a
-distance d from the own position, where its state is ``age`` old and the own state ``own_age``, and where it
-may be ``_MAX_PLAN_OFFSET`` off its plan. Until the end of the plans that are made within S + P from now, both
-approach by at most c·(S + P + H) + v·(``age`` + ``own_age``). So it is ignored for at most
+``reach``: the distance at which the field, the tangential band and the field of approach angles act when the
+two close at c, the sum of both speeds. Neither vehicle is faster than v, the norm of ``limits.v_max``, so
+c = 2 v. Consider a neighbour at a distance d from the own position, where its state is ``age`` old and the
+own state ``own_age``, and where it may be ``_MAX_PLAN_OFFSET`` off its plan. Until the end of the plans that
+are made within S + P from now, both approach by at most c·(S + P + H) + v·(``age`` + ``own_age``). So it is
+ignored for at most
 
     S = (d − reach(c) − v·(age + own_age) − _MAX_PLAN_OFFSET) / c − P − H
 
@@ -179,8 +180,8 @@ def _reach(
 ) -> float:
     """Return ``RelevanceFilter._reach`` at the speed ``closing`` (m/s).
 
-    ``slowing`` is 1/(2 a_rel), s²/m; the others are the settings of the field, the band and the angles, m and
-    s.
+    ``slowing`` is 1/(2 ``field.braking``), s²/m; ``reaction`` (s) is that of the field; ``band`` (m) and
+    ``reach_s`` (s) are those of the tangential band; ``least`` (m) is the reach of the approach angles.
     """
     braking = closing * (closing * slowing + reaction)
     return max(d_safe + max(braking, band + reach_s * closing), least)

@@ -61,7 +61,7 @@ class Avoidance(Protocol):
 
     @property
     def horizon(self) -> Horizon | None:
-        """Horizon that is flown; None while nothing is steered."""
+        """Horizon that is flown; None while set-points do not steer the vehicle."""
         ...
 
     @property

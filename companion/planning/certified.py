@@ -71,7 +71,7 @@ class CertifiedAvoidance:
         """Do nothing: the limits of committed plans are those of the configuration."""
 
     def begin(self, now: int, measured: Motion) -> None:
-        """Hold the ``measured`` position until the autopilot follows set-points."""
+        """Hold the ``measured`` position, or continue the committed plan, see ``CertifiedFlight.stand``."""
         self._flight.stand(now, measured.position)
 
     def pause(self, gap: int) -> None:
@@ -109,7 +109,7 @@ class CertifiedAvoidance:
         return now < self.next_due and self._flight.idle(now)
 
     def receive(self, now: int, link: str, message: Message) -> bool:
-        """Receive plans, rosters and clocks of the swarm link; return False for any other message."""
+        """Receive TUNNEL (plans, rosters) and TIMESYNC of the swarm link; return False for other messages."""
         if link != "swarm" or not isinstance(message, Tunnel | Timesync):
             return False
         self._flight.receive(now, message)

@@ -47,7 +47,7 @@ class FieldAvoidance:
 
     @property
     def horizon(self) -> Horizon | None:
-        """Horizon that is flown; None while nothing is steered."""
+        """Horizon that is flown; None while set-points do not steer the vehicle."""
         return self.guard.horizon
 
     @property

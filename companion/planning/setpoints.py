@@ -32,8 +32,8 @@ class Setpoints:
     def due(self, now: int, view: View) -> list[Message]:
         """Return the set-point if one is due at ``now`` (µs), otherwise an empty list.
 
-        No set-point is sent without a horizon, a known autopilot and a local frame, while nothing is steered,
-        or if it is not finite.
+        No set-point is sent without a horizon, a known autopilot or a local frame, while ``pilot.streaming``
+        is false, or if it is not finite.
         """
         if now < self.next_due:
             return []

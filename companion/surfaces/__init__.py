@@ -2,8 +2,9 @@
 
 The paper allows any surface (Sec. IV-A: "our approach can attain any desired 3D destination surface"). A
 surface is a set of offsets from the target, fleet-local ENU, m. The destination is its point nearest to the
-vehicle, x̌ = x_P + nearest(x_R − x_P); for the paper's circle that is the paper's formula (Sec. III-B). The
-configuration sets kind and size, for all vehicles or for each one.
+vehicle, x̌ = x_P + nearest(x_R − x_P) with the positions x_P of the target and x_R of the vehicle; for the
+paper's circle that is the paper's formula (Sec. III-B). The configuration sets kind and size, for all
+vehicles or for each one.
 """
 
 from __future__ import annotations

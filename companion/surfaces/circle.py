@@ -24,7 +24,7 @@ class Circle(Settings):
     def nearest(self, offset: Array) -> Array:
         """Return [d cos ψ, d sin ψ, h] with ψ the bearing of the vehicle *from the target*.
 
-        ψ is east if the vehicle is straight above the target.
+        d is ``radius`` and h is ``height``. ψ is 0 (east) if the vehicle is straight above the target.
         """
         result = np.empty(offset.shape)
         result[..., 0], result[..., 1] = outward(offset, self.radius)

@@ -12,7 +12,8 @@ from companion.values.horizon import Array
 def bearing(origin: Array, point: Array) -> float:
     """Return the horizontal bearing (rad) of ``point`` seen from ``origin``; 0 if they coincide.
 
-    It is the arctangent of two arguments; the paper's quotient (Sec. III-B) loses the half plane.
+    It is the arctangent of two arguments; that of the paper's quotient (Sec. III-B) is the same for opposite
+    directions.
     """
     return atan2(point[1] - origin[1], point[0] - origin[0])
 

@@ -2,7 +2,8 @@
 
 A kernel is compiled for fixed argument types when its module is imported, and its machine code is kept on
 disk, so nothing is compiled in flight. A part is inlined into the kernels of its module that call it. Numba
-monitors only the file of a stored kernel: a kernel and its parts are in the same file.
+compiles a stored kernel again only if the kernel's own file has changed: so a kernel and its parts must be in
+the same file.
 """
 
 from __future__ import annotations

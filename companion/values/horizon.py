@@ -109,7 +109,7 @@ def _state(knots: Array, elapsed: int, dt: int, found: Array) -> None:
 
 @kernel(VOID, array(2), INT, INT, INT, output(2))
 def _positions(knots: Array, elapsed: int, step: int, dt: int, found: Array) -> None:
-    """Write ``_positions_of`` a whole horizon."""
+    """Write the positions ``found`` of a whole horizon, see ``_positions_of``."""
     _positions_of(knots, len(knots) - 1, elapsed, step, dt, found)
 
 

@@ -18,7 +18,8 @@ class Obstacles(NamedTuple):
 
     ``positions`` (M, N + 1, 3) are those at n = 0…N. ``d_min`` and ``d_safe`` (M,) are distances between
     centres and include ``radius`` (M,) or (1,), by which an obstacle is larger than a vehicle: its own size,
-    and a margin for the uncertainty of its position. ``ids`` identify the obstacles for latches and logs.
+    and a margin for the uncertainty of its position. ``ids`` identify the obstacles for logs, and for
+    methods that store on which side they pass an obstacle.
     """
 
     ids: tuple[int, ...]

@@ -1,7 +1,8 @@
 """Double integrator over the horizon, as matrices: the A and B of the paper, eq. (8), stacked.
 
-Deviation from the paper: A and B are 6 × 6 and 6 × 3, as the equation shows, not 3 × 3; per axis that leaves
-2 × 2 and 2 × 1. With a (n,) the accelerations of n steps, velocities 1…n are v + S_v a and positions 1…n are
+Deviation from the paper: A and B are 6 × 6 and 6 × 3, as the equation shows, not 3 × 3, as the text says; per
+axis that leaves 2 × 2 and 2 × 1. With x and v the position and velocity on an axis at step 0, a (n,) the
+accelerations of n steps and t (n,) their ends, velocities 1…n are v + S_v a and positions 1…n are
 x + t v + S_x a.
 """
 

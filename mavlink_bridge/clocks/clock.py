@@ -44,7 +44,8 @@ class WallClock:
     A correction of the host's time therefore causes no jump.
 
     Two WallClocks of one host with the same ``offset_ns`` agree exactly, also in different processes, because
-    they share the monotonic clock. Any other ``offset_ns`` moves time 0 away from the Unix epoch.
+    they share the monotonic clock. An ``offset_ns`` other than the default moves time 0 away from the Unix
+    epoch.
     """
 
     def __init__(self, offset_ns: int | None = None) -> None:

@@ -66,8 +66,8 @@ class FollowedClock:
 
     Before the first stamp it runs as ``clock`` does. Where stamps jump by more than half a second of wall
     time, it continues without a jump and takes the new offset; ``steps`` counts these jumps. It does the
-    same, uncounted, where a simulation has lost 50 ms or more. ``rate``: its rate relative to ``clock``. One
-    thread may feed it while others read it.
+    same, uncounted, for a jump of more than 50 ms of wall time if the rate error is more than 2 %. ``rate``:
+    its rate relative to ``clock``. One thread may feed it while others read it.
 
     ``simulated``: whether the stamps are a simulation's. None: this is decided after ten to thirty seconds of
     stamps; if they are not a simulation's, the clock then runs as ``clock`` does.

@@ -39,7 +39,8 @@ class Demultiplexer:
 
     ``deal`` maps the name of an end to a predicate. A frame goes to every end whose predicate is true of its
     header, and is discarded if there is none. Frames with a wrong checksum or of a message that the dialect
-    lacks are discarded, too; signatures are not verified. ``observer`` observes all other frames.
+    lacks are discarded, too; signatures are not verified. ``observer`` observes all sent data and all
+    received frames with a valid checksum and a known message, also those that no end receives.
 
     Only one thread at a time may read the ends. Closing the last end closes the physical link.
     """

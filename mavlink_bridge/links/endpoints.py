@@ -75,7 +75,7 @@ class UdpOut:
 
 @dataclass(frozen=True, slots=True)
 class Multicast:
-    """Multicast group; ``interface``: its IPv4 address, None: chosen by the routing table."""
+    """Multicast group; ``interface``: IPv4 address of the interface, None: the routing table selects one."""
 
     group: str = MULTICAST_GROUP
     port: int = MULTICAST_PORT

@@ -43,8 +43,9 @@ class Link(Protocol):
     def fileno(self) -> int | None:
         """Return the file descriptor to wait for, or None if there is none and the link must be polled.
 
-        When it is readable, ``receive`` has something to do. It stays the same as long as the link is open. A
-        link that has lost its peer tries to reconnect in ``receive``, so call that periodically as well.
+        When it is readable, ``receive`` has something to do. It stays the same as long as the link is open;
+        only ``SerialPort.let_go`` replaces it. A link that has lost its peer tries to reconnect in
+        ``receive``, so call ``receive`` periodically as well.
         """
         ...
 

@@ -15,7 +15,8 @@ class ReplayLink:
     Records of both directions and of all links of the log are included: a receiver must filter out its own
     messages. A record whose time steps back arrives with the previous one.
 
-    Sent datagrams are discarded and count as dropped. Raises LogError if the log cannot be read.
+    Sent datagrams are discarded and count as dropped. The constructor raises LogError if the first record
+    cannot be read; a later read error ends the log.
     """
 
     def __init__(self, endpoint: Replay, clock: Clock) -> None:

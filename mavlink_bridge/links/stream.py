@@ -15,7 +15,7 @@ class Assembler:
 
     All other bytes, garbage included, are passed on at once, so that the decoder can count them. A frame of
     an unknown message is held back until the byte after it arrives. Garbage that looks like the start of a
-    frame may make the decoder wait for the next piece.
+    frame is also held back, until as many bytes as its header claims have arrived.
     """
 
     def __init__(self) -> None:

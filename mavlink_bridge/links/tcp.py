@@ -21,7 +21,8 @@ PATIENCE: Final = 5_000_000
 """µs after which a connection attempt is aborted: TCP repeats a lost packet after one and three seconds."""
 
 _PEER_TIMEOUT_S: Final = 30
-# For sent data that the peer has not acknowledged. An idle connection ends after 15 s + 3 probes of 5 s.
+# TCP_USER_TIMEOUT (ms) limits how long sent data may stay without acknowledgement. The other options end an
+# idle connection to a lost peer after 15 s + 3 probes of 5 s.
 _TIMEOUT_OPTIONS: Final = {
     "TCP_USER_TIMEOUT": 1000 * _PEER_TIMEOUT_S,
     "TCP_KEEPIDLE": 15,
@@ -52,7 +53,7 @@ class TcpCaller(StreamLink):
     """
 
     def __init__(self, endpoint: TcpOut, clock: Clock) -> None:
-        # Before anything is opened, because it may raise.
+        # ``resolved`` may raise; therefore it is called before anything is opened.
         self._family, self._address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)
         super().__init__(clock, BACKLOG)
         self._attempt: socket.socket | None = None
@@ -109,7 +110,7 @@ class TcpListener(StreamLink):
         super().__init__(clock, BACKLOG)
         self._listener = listener = socket.socket(family, socket.SOCK_STREAM)
         try:
-            # Otherwise the port could not be bound for a minute after a restart.
+            # Without SO_REUSEADDR the port could not be bound for a minute after a restart.
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listener.bind(address)
             listener.listen()

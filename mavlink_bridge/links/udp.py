@@ -16,13 +16,14 @@ Address = tuple[Any, ...]
 """Address as in the socket module: (host, port, …)."""
 
 REMEMBERED: Final = 10_000_000
-"""µs for which a listening link sends to a peer after its last packet; to the latest peer without limit."""
+"""µs after a peer's last packet during which a listening link sends to it; no limit for the latest peer."""
 MOST_PEERS: Final = 32
 """Largest number of peers of a listening link."""
 STEADY: Final = 3_000_000
 """µs without a packet after which a new peer may replace the most silent of ``MOST_PEERS`` peers."""
 _MAX_PACKET_BYTES: Final = 65536
-# The default holds some 250 packets: less than a swarm sends while one plan is being solved on a busy host.
+# The system's default buffer holds some 250 packets: less than a swarm sends while one plan is being solved
+# on a busy host.
 _RECEIVE_BUFFER_BYTES: Final = 1 << 20
 
 
@@ -99,8 +100,8 @@ class _Udp:
 class UdpListener(_Udp):
     """Link of ``udpin``: a bound socket that sends to all peers of the last 10 s, or else to the latest one.
 
-    Of too many peers, those that continue to send are kept. Packets of a further peer are received, but
-    nothing is sent to it: otherwise a sender with many ports could displace all other peers.
+    Of more than ``MOST_PEERS`` peers, those that continue to send are kept. Packets of a further peer are
+    received, but nothing is sent to it: otherwise a sender with many ports could displace all other peers.
 
     This matches pymavlink and differs from mavlink-router's server mode, which sends to the latest peer only:
     of two peers (an autopilot's two ports, a ground station and a script) each would then receive half of the
@@ -129,8 +130,8 @@ class UdpListener(_Udp):
         return sum(now - time <= REMEMBERED for time in self._peers.values())
 
     def _accepts(self, source: Address) -> bool:
-        # A new dictionary each time, because the sending thread may be iterating over the old one. It is
-        # sorted by time, the latest sender last.
+        # Each call makes a new dictionary, because the sending thread may be iterating over the old one. The
+        # dictionary is sorted by time, the latest sender last.
         now = self._clock.now()
         peers = {
             peer: time for peer, time in self._peers.items() if peer != source and now - time <= REMEMBERED

@@ -8,7 +8,7 @@ from mavlink_bridge.loops.histogram import Histogram
 
 
 class Deadlines:
-    """The grid ``phase`` + k ``period`` (µs, multiples of 4; k an integer), and statistics of its lateness.
+    """The grid ``phase`` + k ``period`` (µs, multiples of 4; k an integer), and the lateness of the steps.
 
     After a late step the node continues with the latest deadline that has passed; earlier ones are skipped.
     Lateness therefore never causes a burst and never shifts the grid. ``misses`` counts steps that began more

@@ -37,7 +37,8 @@ class Histogram:
         value = max(value, 0)
         self.count += 1
         self.max = max(self.max, value)
-        # Floating point with an exponent (octave) and 5 bits behind the leading one; exact up to 6 bits.
+        # The bin number is like a floating-point number: an exponent (octave), and 5 bits behind the leading
+        # one. Values of up to 6 bits have a bin of their own.
         octave = max(value.bit_length() - _BITS - 1, 0)
         place = (octave << _BITS) + (value >> octave)
         self._bins[min(place, len(self._bins) - 1)] += 1

@@ -45,9 +45,9 @@ class RealTime:
     """Loop that steps ``scheduled.node`` at phase + k period (µs).
 
     Deadlines are on the node's own clock if ``scheduled`` has one, otherwise on ``clock``. The first is the
-    earliest that is neither past nor before the phase. The node receives the deadline, not the instant at
-    which the step begins, less than a period later. So the node's own periods divide evenly, and the low two
-    bits of every time are free for a tlog's link.
+    earliest that is neither past nor before the phase. The node receives the deadline; the step begins less
+    than a period after it. So the node's own periods divide evenly, and the low two bits of every time are
+    free for a tlog's link.
 
     ``links`` maps the node's name for a link to one or several links; what the node sends goes to all of
     them. The loop owns the links and closes them at the end. After each step the loop calls ``on_idle(µs)``

@@ -1,10 +1,10 @@
 """Values that outrider exchanges: one frozen tuple per MAVLink message, SI units, the message's own frame.
 
-Angles are radians, distances metres, latitudes and longitudes degrees (float64, so that the degE7 step of 1.1
-cm is kept), times integer µs. Positions stay local NED or geodetic as in the message; only ``frames``
-converts them. ``None`` stands for a field that the sender marked unknown, except where the message's own
-marker is NaN. The values are tuples rather than
-dataclasses because they are created thousands of times a second, and a tuple costs a third as much.
+Unless a class says otherwise, angles are radians, distances metres, latitudes and longitudes degrees
+(float64, so that the degE7 step of 1.1 cm is kept), times integer µs. Positions stay local NED or geodetic as
+in the message; only ``frames`` converts them. ``None`` stands for a field that the sender marked unknown,
+except where the message's own marker is NaN. The values are tuples rather than dataclasses because they are
+created thousands of times a second, and a tuple costs a third as much.
 
 A message is declared in one place: its class, with the decorator ``declaration.message``, in the module of
 its subject.

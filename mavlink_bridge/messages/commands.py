@@ -87,7 +87,7 @@ class SetMode(NamedTuple):
 
 @message("REQUEST_DATA_STREAM")
 class RequestDataStream(NamedTuple):
-    """REQUEST_DATA_STREAM (66): ``rate`` in Hz; ``start`` 1 or 0."""
+    """REQUEST_DATA_STREAM (66): ``rate`` in Hz; ``start``: 1 starts, 0 stops the stream."""
 
     source: Source
     rate: int

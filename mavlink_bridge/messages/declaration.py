@@ -46,8 +46,8 @@ class Converter(NamedTuple):
     """Conversion of one message to its payload and back.
 
     ``decode`` builds a message from the fields in wire order, or returns None if a field is invalid;
-    ``encode`` is the reverse. ``finite``: a NaN or infinity in any field is an error; otherwise it is kept,
-    as it may mean *ignored* or *unknown*. ``size_v1``: payload bytes without extension fields.
+    ``encode`` is the reverse. ``finite``: if True, a NaN or infinity in any field is an error; if False, it
+    is kept, as it may mean *ignored* or *unknown*. ``size_v1``: payload bytes without extension fields.
     """
 
     message: type[Message]

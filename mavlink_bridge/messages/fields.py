@@ -1,7 +1,7 @@
 """Conversions of fields that several messages share.
 
-All messages convert degE7 ↔ degrees (float64), mm, cm/s, mV, % ↔ m, m/s, V, 0…1, cdeg ↔ rad, ms ↔ µs (rounded
-down to ms), and markers of *unknown* ↔ None.
+Unless a class says otherwise, messages convert degE7 ↔ degrees (float64), mm, cm/s, mV, % ↔ m, m/s, V, 0…1,
+cdeg ↔ rad, ms ↔ µs (rounded down to ms), and markers of *unknown* ↔ None.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ class Tunnel(NamedTuple):
 class SetupSigning(NamedTuple):
     """SETUP_SIGNING (256): sign with ``key`` from now on.
 
-    ``since`` is the current time (10 µs since 2015). Zeros in both end signing.
+    ``since`` is the current time in units of 10 µs since 2015-01-01. Zeros in both end signing.
     """
 
     source: Source

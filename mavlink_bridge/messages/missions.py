@@ -76,8 +76,8 @@ class MissionSetCurrent(NamedTuple):
 class MissionCurrent(NamedTuple):
     """MISSION_CURRENT (42).
 
-    ``total`` is the number of the last item, 65535 without a mission; ``state`` is MISSION_STATE;
-    ``mode`` is 1 in mission mode, 2 out of it; the ids of the three plans follow.
+    ``total`` is the number of items without home (MAVLink: 65535 without a mission, 0 if not supported);
+    ``state`` is MISSION_STATE; ``mode`` is 1 in mission mode, 2 out of it; the ids of the three plans follow.
     """
 
     source: Source

@@ -20,7 +20,7 @@ from mavlink_bridge.messages.source import Source, Vector
 
 _UNKNOWN_U8 = 0xFF
 _MILLI_G = 9.80665e-3
-# Every field of HIGHRES_IMU.
+# HIGHRES_IMU.fields_updated with the bits of all 13 measured values.
 _ALL_UPDATED = 0x1FFF
 
 

@@ -14,11 +14,13 @@ class Faults(NamedTuple):
 
     The delay is ``delay`` µs, plus up to ``jitter`` µs, uniform; ``loss``, ``duplication``, ``reordering``
     are probabilities in 0…1. A reordered datagram arrives one tick after the next datagram of its path
-    (never, if none follows). Jitter that exceeds the spacing of datagrams reorders them, too.
+    that is not lost (never, if none follows). Jitter that exceeds the spacing of datagrams reorders them,
+    too.
 
     ``burst``: with 0 the losses are independent of each other. Otherwise losses come in bursts of ``burst``
-    datagrams on average, and ``loss`` remains their share: the chain of Gilbert (1960) with two states, one
-    that passes all and one that loses all. A burst below ``loss / (1 - loss)`` or 1 is impossible.
+    datagrams on average, and ``loss`` remains the share of lost datagrams: the chain of Gilbert (1960) with
+    two states, one that passes all and one that loses all. A burst below ``loss / (1 - loss)`` or 1 is
+    impossible.
     """
 
     delay: int = 0

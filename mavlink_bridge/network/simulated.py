@@ -164,7 +164,7 @@ class SimulatedNetwork:
                 latency, link_name, arrival = -1, "", None
                 for path in paths:
                     if path.deterministic and now >= path.blocked_until:
-                        # Most receivers share latency and link name, so that the entry is made once.
+                        # Most receivers share latency and link name; they then share one queue entry.
                         if arrival is None or path.latency != latency or path.link != link_name:
                             latency, link_name = path.latency, path.link
                             arrival = (now + latency, sender, number, 1, Datagram(link_name, data))

@@ -307,7 +307,7 @@ class _Pass:
         """Continue behind the next frame with a correct checksum; return its record, or None.
 
         The 8 bytes before the frame are its stamp if they were skipped and are plausible; otherwise it gets
-        the last stamp. ``cut``: the end of the file may cut off the current record.
+        the last stamp (0 if there is none). ``cut``: the end of the file may cut off the current record.
         """
         skipped = 0
         while self._fill():

@@ -88,9 +88,9 @@ class Codec:
         A partial frame waits for its rest. With ``whole`` it is dropped instead: in datagrams of several
         senders no rest follows, and the partial frame would delay the data of the next sender.
 
-        A NaN or infinity drops a message declared as ``finite`` (counted as bad). Other messages keep it, as
-        it may mean *ignored* or *unknown*: commands, set-points and their echo, mission items, altitude,
-        home, estimator reports.
+        A NaN or infinity drops a message declared as ``finite``, or whose ``decode`` rejects it (both counted
+        as bad). Other messages keep it, as it may mean *ignored* or *unknown*: commands, set-points and their
+        echo, mission items, altitude, home, estimator reports.
         """
         accept, signing = self._accept, self._signing
         found: list[Message] = []

@@ -202,8 +202,9 @@ class Framer:
     It keeps at most 280 bytes between two calls. After a false start the search continues one byte later. A
     frame of an unknown message cannot be verified. It is therefore accepted only if a start byte follows it
     (the framer waits for this byte); otherwise it counts as a false start. ``whole``: no frame continues in
-    the next call, so nothing waits. ``frames`` counts known frames, ``unknown`` accepted unknown ones,
-    ``bad`` false starts, and ``skipped_bytes`` the bytes that belong to no frame.
+    the next call, so nothing waits, and an unknown frame at the end of the data is accepted. ``frames``
+    counts known frames, ``unknown`` accepted unknown ones, ``bad`` false starts, and ``skipped_bytes`` the
+    bytes that belong to no frame.
     """
 
     def __init__(self, *, unknown: bool = False) -> None:

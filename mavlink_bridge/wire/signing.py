@@ -68,7 +68,7 @@ class Signing:
 
         A node without the time of day may count from any instant before 2015. After the first call, frames of
         a new stream are refused if their stamp is not later than the time of that call: they may have been
-        recorded before a restart.
+        recorded before a restart. A new key ends this refusal.
         """
         stamp = (unix - EPOCH) // UNIT
         if stamp > self.newest:

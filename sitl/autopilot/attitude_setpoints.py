@@ -21,7 +21,7 @@ HOVERING: Final = 0.5
 STEEPEST: Final = math.radians(45.0)
 """Largest tilt that is followed (rad)."""
 
-# Accepted norms of the quaternion, and the accepted yaw rate (rad/s).
+# Accepted norms of the quaternion, and the largest accepted yaw rate (rad/s).
 _NORM_RANGE: Final = (0.9, 1.1)
 _MAX_YAW_RATE: Final = 100.0
 
@@ -49,7 +49,7 @@ def climbing(message: SetpointAttitude, climb: float, sink: float) -> Reading:
 
 
 def thrusting(message: SetpointAttitude) -> Reading:
-    """Read the message as PX4 does: thrust is thrust, and 0.5 is hover thrust."""
+    """Read the message as PX4 does: the force is proportional to the thrust value, 0.5 for hovering."""
     fault = _fault(message)
     if fault is not None:
         return fault

@@ -49,7 +49,7 @@ class AutonomousModes:
         self._returning.end()
 
     def advance(self, mode: Mode, now: int, here: Estimate) -> Event | None:
-        """Continue the flight at ``now`` (µs), if ``mode`` is one of ``MODES``."""
+        """Continue the flight at ``now`` (µs), if ``mode`` is in ``MODES`` and the guidance is not paused."""
         if self._guidance.paused:
             return None
         if mode is Mode.MISSION:

@@ -13,7 +13,7 @@ from sitl.autopilot.commander import Commander
 from sitl.autopilot.firmware import CommandRefusal, Firmware, Mode
 from sitl.values.home import ABOVE_HOME, ABOVE_SEA, NOWHERE
 
-# Parameter 2 of COMPONENT_ARM_DISARM (400) that forces it.
+# Value of parameter 2 of COMPONENT_ARM_DISARM (400) that forces arming or disarming.
 _FORCE_CODE: Final = 21196.0
 
 
@@ -56,7 +56,7 @@ class Orders:
     """Executor of commands. A repeated request to arm, to disarm or for a mode has no further effect."""
 
     def __init__(self, commander: Commander, flavour: Firmware, more: Mapping[int, Handler]) -> None:
-        """``more`` maps further MAV_CMDs, which do not concern flight, to their handlers."""
+        """``more`` maps all other supported MAV_CMDs to their handlers."""
         self._commander = commander
         self._flavour = flavour
         self._handlers: dict[int, Handler] = {

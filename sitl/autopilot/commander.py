@@ -131,8 +131,8 @@ class Commander:
     def fail_safe(self, mode: Mode, now: int) -> None:
         """Change to ``mode`` as a failsafe.
 
-        Ignored while disarmed, on the ground, or in a mode at least as severe. Without a position the mode is
-        LAND instead.
+        The call has no effect while the vehicle is disarmed, on the ground, or in a mode at least as severe.
+        Without a position the vehicle enters LAND instead.
         """
         if not self.armed or self.landed or _SEVERITY.get(mode, 0) <= _SEVERITY.get(self.mode, 0):
             return
@@ -283,7 +283,7 @@ class Commander:
             self._switch(Mode.LAND, now)
 
     def _confirm_landing(self, now: int) -> None:
-        """Handle ground contact; after ``touchdown_time`` the vehicle counts as landed."""
+        """Handle ground contact, except during a takeoff; after ``touchdown_time`` the vehicle has landed."""
         activity = self._guidance.activity
         if activity is Activity.TAKEOFF:
             return

@@ -52,7 +52,8 @@ class Course:
     def reference(self) -> Reference | None:
         """Requested motion without jerk and yaw acceleration; None if the guidance is idle.
 
-        With a model of a firmware's response the motion of ``next`` lags behind set-points of position.
+        With a model of a firmware's response, this is the motion that position set-points request, and the
+        motion of ``next`` lags behind it.
         """
         guidance = self._guidance
         if guidance.activity is Activity.IDLE:
@@ -104,7 +105,7 @@ class Course:
 
 
 def believed(reference: Reference, off: Deviation) -> Reference:
-    """Return ``reference`` shifted, so that control on the truth acts as on an estimate with this error."""
+    """Return ``reference`` shifted so that control on the truth acts as on an estimate with error ``off``."""
     return reference._replace(
         position=reference.position - off.position,
         velocity=reference.velocity - off.velocity,
@@ -134,7 +135,8 @@ class Level(NamedTuple):
         Height and heading are tracked; horizontally the vehicle flies level in terms of its estimate, and so
         drifts with the air. The horizontal errors of position and velocity are set to zero; the acceleration
         offsets the controller's compensation of drag and of the estimated disturbance force. Jerk and snap
-        offset its response to the acceleration that was not requested, so that this does not turn the thrust.
+        offset the controller's response to acceleration that was not requested, so that this response does
+        not turn the thrust.
         """
         shifted = believed(reference, off)
         position, velocity = shifted.position.copy(), shifted.velocity.copy()

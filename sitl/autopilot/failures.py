@@ -52,7 +52,7 @@ class Failures:
             self._plant.sensors.gps.regain()
 
     def _motor(self, instance: float, left: float) -> CommandRefusal | None:
-        """Set the remaining speed of motor ``instance``: 1 is the first motor, 0 all."""
+        """Limit motor ``instance`` (1: the first, 0: all) to the fraction ``left`` (0…1) of its speed."""
         count = len(self._plant.vehicle.config.rotors)
         if not math.isfinite(instance) or not 0 <= instance <= count:
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Failure refused: there are {count} motors")

@@ -34,9 +34,9 @@ class Breach(IntEnum):
 class Rules(NamedTuple):
     """Interpretation of fences by a firmware.
 
-    ``any_area``: the vehicle must be inside one of the inclusion areas (PX4), else inside all. ``areas``:
-    whether areas count. ``floor`` and ``height`` (m above home) and ``radius`` (m around home) are infinite
-    where there is no limit.
+    ``any_area``: the vehicle must be inside at least one of the inclusion areas (PX4); if False, inside
+    all. ``areas``: whether uploaded polygons and circles are checked. ``floor`` and ``height`` (m above home)
+    and ``radius`` (m around home) are infinite where there is no limit.
     """
 
     enabled: bool

@@ -83,7 +83,7 @@ class Following:
         self._guidance.track(setpoint, now, None, here, now)
 
     def advance(self, now: int) -> None:
-        """Hold if the leader is lost; call this in each step at ``now`` (µs)."""
+        """Hold if no usable report came for ``patience`` seconds; call this in each step at ``now`` (µs)."""
         lost = now - self._received > self._config.patience * 1e6
         if lost and self._guidance.activity is Activity.TRACK:
             self._guidance.hold()
@@ -96,8 +96,8 @@ class Following:
     def _motion(self, message: FollowTarget | GlobalPosition) -> tuple[Vector, Vector]:
         """Return position (m) and velocity (m/s), local NED.
 
-        GLOBAL_POSITION_INT: the leader's height above its home is applied above the own home, as by default;
-        FOLLOW_TARGET: the altitude above sea level counts.
+        GLOBAL_POSITION_INT: the leader's height above its home is applied above the own home, as with the
+        default of ArduPilot's FOLL_ALT_TYPE; FOLLOW_TARGET: the altitude above sea level counts.
         """
         x, y, z = self._origin.local(message.latitude, message.longitude, message.altitude)
         if isinstance(message, GlobalPosition):

@@ -1,4 +1,4 @@
-"""Guidance: the current activity as a reference to track (stand, take off, follow set-points, hold, land).
+"""Guidance: the current activity as a reference (idle, take off, go, follow set-points, hold, land).
 
 All values are in the vehicle's own local NED. Every motion passes the shaper, so that none begins with a
 step, and then, if so configured, a model of a firmware's response. With such a response, set-points that give
@@ -41,8 +41,7 @@ class Guidance:
     """One reference, advanced in steps of some ms.
 
     ``motion`` (SI, local NED) and ``yaw``, ``yaw_rate`` are the present reference. ``timed_out`` becomes true
-    when no set-point has come within the time limit: the vehicle then brakes and holds where it comes to
-    rest.
+    when no set-point has come within the time limit: the vehicle then brakes and holds, see ``_expire``.
     """
 
     def __init__(self, config: AutopilotConfig) -> None:
@@ -131,7 +130,7 @@ class Guidance:
     def takeoff(self, height: float, here: Pose) -> None:
         """Climb vertically to ``height`` (m above the origin).
 
-        ``here`` is the pose at which the reference begins if there is none, here and in the methods below.
+        In this and the following methods ``here`` is the pose at which the reference begins if there is none.
         """
         self._leave_ground(here)
         x, y, _ = self._shaper.position
@@ -145,7 +144,7 @@ class Guidance:
         self._begin(Activity.GO, Setpoint((POSITION, POSITION, POSITION), position, yaw=yaw))
 
     def track(self, setpoint: Setpoint, received: int, timeout: int | None, here: Pose, now: int) -> None:
-        """Follow ``setpoint``, valid at the time ``received`` (µs), until ``timeout`` µs after that."""
+        """Follow ``setpoint``, valid at the time ``received`` (µs), for ``timeout`` µs (None: no limit)."""
         self._leave_ground(here)
         self._received = received
         self._deadline = _FOR_EVER if timeout is None else received + timeout
@@ -247,7 +246,7 @@ class Guidance:
         if response is not None and self._unshaped:
             self._commanded = wanted.position, wanted.velocity, wanted.acceleration
             response.advance(self._commanded, dt, wind, drift)
-            # The activity after the stream begins where the firmware's response is now.
+            # The activity after the stream begins on the trajectory that the firmware derives from it.
             shaper.position, shaper.velocity, shaper.acceleration = response.desired
             return
         shaper.advance(wanted, self._limits[self.activity], dt)
@@ -257,8 +256,8 @@ class Guidance:
     def _expire(self, last: Setpoint) -> None:
         """Brake and hold after set-points have ceased.
 
-        ArduPilot discards the commanded velocity but keeps the position, extrapolated to the time-out; the
-        vehicle returns to it.
+        With a model of its response, ArduPilot discards the commanded velocity but keeps the commanded
+        position, extrapolated to the time-out; the vehicle returns to this position.
         """
         persists = self._response is not None and self._config.flavour == "ardupilot"
         if persists and last.levels[0] == POSITION:

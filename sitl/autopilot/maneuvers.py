@@ -18,7 +18,7 @@ from sitl.estimation.sensors import Estimate
 from sitl.values.home import Home
 from sitl.values.origin import Origin
 
-# Air and ground speed are treated alike, because guidance ignores wind.
+# An air speed is treated as a ground speed, because the speed limits of the guidance ignore the wind.
 _HORIZONTAL: Final = (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED)
 _VERTICAL: Final = (mavlink.SPEED_TYPE_CLIMB_SPEED, mavlink.SPEED_TYPE_DESCENT_SPEED)
 # Values of parameter 2 of DO_CHANGE_SPEED.
@@ -79,7 +79,7 @@ class Maneuvers:
         return None
 
     def _check(self, order: Order) -> CommandRefusal | None:
-        # PX4 runs its checks in flight as well.
+        # PX4 runs its checks while armed as well; ArduPilot refuses them.
         if self._commander.armed and self._flavour.stops:
             return CommandRefusal(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "Checks refused: armed")
         self._say_doubts(order.now)
@@ -93,7 +93,10 @@ class Maneuvers:
         return None
 
     def _change_speed(self, order: Order) -> CommandRefusal | None:
-        """Change the horizontal speed until another mode is entered."""
+        """Change the horizontal speed of the present flight and of later DO_REPOSITION flights in this mode.
+
+        In MISSION, the itinerary keeps the speed until the mission begins anew.
+        """
         kind, speed = order.params[:2]
         if speed == _NO_CHANGE:
             return None
@@ -126,7 +129,11 @@ class Maneuvers:
         return None
 
     def _turn(self, order: Order) -> CommandRefusal | None:
-        """Execute CONDITION_YAW: parameter 1 angle (degrees), 3 direction, 4 whether it is relative."""
+        """Execute CONDITION_YAW.
+
+        Parameter 1 is the angle (degrees), parameter 4 is 1 if it is relative to the present yaw. Parameter 3
+        is the direction of a relative turn: counter-clockwise if negative, else clockwise.
+        """
         angle, _, direction, relative = order.params[:4]
         if not (0.0 <= angle <= 360.0 and relative in (0.0, 1.0)):
             return CommandRefusal(
@@ -180,7 +187,7 @@ class Maneuvers:
         ):
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Reposition refused: no such place on the globe")
         else:
-            # Height of level ground there, which the Earth's curvature lowers.
+            # ``level``: z of that place at the origin's altitude. The Earth's curvature makes it positive.
             x, y, level = self._origin.local(latitude, longitude, self._origin.altitude)
         if not math.isfinite(altitude) and not self._flavour.stops:
             return x, y, here[2]
@@ -198,5 +205,5 @@ class Maneuvers:
         return speed if mode is self._commander.mode else self._commander.level_speed
 
     def _yaw(self, asked: float) -> float | None:
-        """Return PX4's parameter 4 (rad); None for ArduPilot, which keeps its heading."""
+        """Return PX4's parameter 4 (rad). None, if it is not finite or for ArduPilot, keeps the heading."""
         return asked if not self._flavour.stops and math.isfinite(asked) else None

@@ -22,8 +22,8 @@ _MAX_INTERVAL_US: Final = 0x7FFFFFFF
 class Requests:
     """Handler of message requests.
 
-    It executes SET_MESSAGE_INTERVAL (511), GET_MESSAGE_INTERVAL (510), REQUEST_MESSAGE (512), the older 410
-    and 520, and REQUEST_DATA_STREAM (66).
+    It executes SET_MESSAGE_INTERVAL (511), GET_MESSAGE_INTERVAL (510), REQUEST_MESSAGE (512), the older
+    GET_HOME_POSITION (410) and REQUEST_AUTOPILOT_CAPABILITIES (520), and REQUEST_DATA_STREAM (66).
     """
 
     def __init__(

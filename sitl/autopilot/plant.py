@@ -20,13 +20,16 @@ from sitl.values.setpoints import ZERO
 from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.multirotor import Reference, VehicleState
 
-# The reference is renewed at least this often (µs), because real position loops run at 50 to 100 Hz; the
-# vehicle's controller extrapolates it in between.
+# Period after which the reference is renewed (µs), because real position loops run at 50 to 100 Hz; the
+# vehicle's controller extrapolates it in between. The period is rounded down to whole physics steps, but is
+# at least one of them.
 _RENEWAL_US: Final = 10_000
 
 
 class Plant:
     """Simulation of the vehicle and its guidance, in strides on a fixed grid from time 0.
+
+    A stride consists of the physics steps that have the same reference.
 
     ``sensors`` is the estimator, ``course`` generates the tracked reference.
     """

@@ -12,8 +12,8 @@ class Saved(BaseModel):
     """Persistent state of an autopilot.
 
     ``parameters``: values that differ from the initial ones, by name; ``plans``: mission, fence and rally
-    points; ``signed_until``: the newest timestamp of a signed message (10 µs since 2015). The JSON functions
-    are ``model_dump_json`` and ``model_validate_json``, which refuses damaged data.
+    points; ``signed_until``: the newest timestamp of a signed message (in 10 µs since the start of 2015). The
+    JSON functions are ``model_dump_json`` and ``model_validate_json``, which refuses damaged data.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")

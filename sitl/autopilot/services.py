@@ -1,4 +1,4 @@
-"""Services of an autopilot beside flying: parameters, requests, files, home.
+"""Services of an autopilot beside flying: parameters, requests, files, home, missions, failures.
 
 The module maps messages and commands to their handlers.
 """

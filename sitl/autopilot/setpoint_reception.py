@@ -1,8 +1,9 @@
-"""Reception of set-points: each is read, timestamped, and followed or refused.
+"""Reception of set-points: each is read, and followed, refused or ignored.
 
 A set-point on the globe is first converted to the vehicle's own local NED. A refused set-point is answered
 with STATUSTEXT (253), at most once a second for the same reason. The vehicle then continues unchanged, or
-brakes where the firmware understands "stop".
+brakes where the firmware understands "stop". A usable set-point is ignored without an answer if it would not
+lift a standing vehicle off the ground, or if PX4 is not in OFFBOARD or is disarmed.
 """
 
 from __future__ import annotations

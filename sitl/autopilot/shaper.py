@@ -1,11 +1,11 @@
 """Shaping of references: acceleration and jerk of the approach are bounded, and its speed is controlled.
 
 The geometric controller must never receive a step. ``Shaper`` is a point mass that approaches the set-point:
-far away it keeps to a speed limit, closer it brakes on v² = 2 a d, and at the end it converges exponentially.
-It serves destinations, velocities, accelerations and moving set-points alike. A set-point that is a
-trajectory (position and velocity on all axes, within limits) is passed through unchanged once the point mass
-has converged to it, until it jumps by more than the release distance or speed: then the point mass approaches
-it again from its present motion.
+far away it keeps to a speed limit, closer it brakes at a constant deceleration, and at the end it converges
+exponentially. It serves destinations, velocities, accelerations and moving set-points alike. A set-point that
+is a trajectory (position and velocity on all axes, within limits) is passed through unchanged once the point
+mass has converged to it, until it jumps by more than the release distance or speed: then the point mass
+approaches it again from its present motion.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _CAPTURE: Final = (0.05, 0.2)  # m, m/s
 _RELEASE: Final = (0.5, 1.0)  # m, m/s
 _AT_REST: Final = (1e-5, 1e-4)  # m/s, m/s²
 
-_YAW_RATES: Final = (6.0, 12.0)  # 1/s, of the yaw's final convergence and of its rate
+_YAW_RATES: Final = (6.0, 12.0)  # 1/s, final convergence of the yaw and of the yaw rate
 _MIN_YAW_RATE: Final = 1e-6  # rad/s
 _FULL_TURN: Final = 2.0 * math.pi
 
@@ -171,9 +171,10 @@ class Heading:
 
 
 def _approach(distance: float, rate: float, braking: float, speed: float) -> tuple[float, float]:
-    """Return s/d and s'(d) of the approach law s(d).
+    """Return s/d and s'(d) (1/s) of the approach law s(d), the closing speed at the distance d.
 
-    The law is linear near zero, √(2 a (d − d₀)) further out, then the speed limit.
+    The law is ``rate`` · d near zero, √(2 a (d − d₀)) further out with a = ``braking`` and d₀ = a/(2 rate²),
+    then the limit ``speed``. The speed may also be a yaw rate, and the distance an angle.
     """
     near = braking / (rate * rate)
     if distance <= near:

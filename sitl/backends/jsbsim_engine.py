@@ -42,7 +42,8 @@ GROUND: Final = len(MEASURED) - 1
 
 _AIR: Final = ("north", "east", "down")
 
-# JSBSim's codes of integrators. Its default ones turn a free tumble by 13° in 10 s.
+# JSBSim's codes of integrators. With its default integrators, the attitude of a free tumble is wrong by 13°
+# after 10 s.
 _EULER, _ADAMS_BASHFORTH_3, _BUSS_2 = 1.0, 4.0, 7.0
 _RATES: Final = ("simulation/integrator/rate/rotational", "simulation/integrator/rate/translational")
 _POSITIONS: Final = {
@@ -77,7 +78,7 @@ class Engine:
     ) -> None:
         """Start with the motion and motor speeds of a ``state`` row of ``sitl.vehicle.pipeline`` (site NED).
 
-        The ground is level at z = ``ground`` (m) there. Raises BackendError.
+        The ground is level; below the start it is at z = ``ground`` (m, site NED). Raises BackendError.
         """
         n = len(config.rotors)
         self._name = config.name
@@ -103,7 +104,7 @@ class Engine:
         self.place = np.concatenate((origin, place.axes.ravel()))
 
     def step(self, commanded: list[float], wind: list[float]) -> None:
-        """Run one physics step with the motors held at ``commanded`` (n,) (rad/s).
+        """Run one physics step with the motor commands held at ``commanded`` (n,) (rad/s).
 
         JSBSim adds its own turbulence to ``wind`` (m/s, NED). Raises BackendError.
         """

@@ -94,7 +94,7 @@ def _ground_reactions(root: Element, config: VehicleConfig) -> None:
     frequency = min(_MAX_FREQUENCY, _MAX_PHASE_PER_STEP / (config.physics_period * 1e-6))
     stiffness = config.mass * frequency**2
     damping = 2.0 * config.mass * frequency
-    # Each spring deflects under the weight by as much as its foot is lower.
+    # Each foot is lower than the ground at rest by the deflection of its spring under the weight.
     foot = config.rest_height + GRAVITY / frequency**2
     for leg in range(_LEGS):
         angle = math.tau * (leg + 0.5) / _LEGS
@@ -137,7 +137,8 @@ def _contact(
 def _motors(root: Element, config: VehicleConfig) -> None:
     """Add the motors: first-order lag, solved exactly for a held command, ω ← c + e^(−h/τ) (ω − c).
 
-    A motor commanded to stop ends at zero instead of decaying through denormal numbers.
+    ω is the motor's speed, c the commanded one, h the step, τ the time constant. A motor commanded to stop
+    ends at zero instead of decaying through denormal numbers.
     """
     system = SubElement(root, "system", name="motors")
     step = config.physics_period * 1e-6
@@ -158,8 +159,8 @@ def _motors(root: Element, config: VehicleConfig) -> None:
 def _aerodynamics(root: Element, config: VehicleConfig, *, isa: bool) -> None:
     """Add the rotors' wrench, the RotorS model as in ``sitl.vehicle.rotors``.
 
-    Thrust is k_f ω² along −b3, torque is k_m times thrust, and −c ω v⊥ gives drag and rolling moment, where
-    v⊥ is the velocity of the hub through the air.
+    Thrust is k_f ω² along −b3 (body axis up) and torque is k_m times thrust. Drag and rolling moment are −c ω
+    v⊥, each with its own c, where v⊥ is the hub's velocity through the air in the plane of the rotor.
     """
     aerodynamics = SubElement(root, "aerodynamics")
     density: tuple[str, ...] = ("atmosphere/sigma",) if isa else ()

@@ -2,7 +2,7 @@
 
 Rows are those of ``sitl.vehicle.pipeline``; controller, allocation and observer are its kernels. A *place*
 row has 12 columns: the origin of the site 0:3 (m, earth-centred, earth-fixed) and, row by row, the rotation
-3:12 from there to the site's NED. A *measured* row is that of ``jsbsim_engine``.
+3:12 from those axes to the site's NED. A *measured* row is that of ``jsbsim_engine``.
 """
 
 from __future__ import annotations

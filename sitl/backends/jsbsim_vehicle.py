@@ -62,8 +62,8 @@ class JsbsimVehicle:
     ) -> FloatArray:
         """Advance as defined by ``Physics``.
 
-        JSBSim takes the wind in the NED of the vehicle's place, which 1 km from the site's origin is tilted
-        by 0.16 mrad.
+        JSBSim takes the wind in the NED of the vehicle's place. The tilt of that frame against the site's
+        NED, 0.16 mrad per km from the site's origin, is neglected.
         """
         command, state, engine = self._command, self._state, self._engine
         write_command(command, reference, idle, wind, self._ground)

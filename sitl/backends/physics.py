@@ -43,7 +43,7 @@ class Physics(Protocol):
 
     @property
     def state(self) -> VehicleState:
-        """True state after the last step; own copies."""
+        """True state after the last step, in arrays that later steps do not change."""
 
     @property
     def on_ground(self) -> bool:

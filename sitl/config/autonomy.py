@@ -23,7 +23,10 @@ class BatteryFailsafeConfig(BaseModel):
 
 
 class FenceConfig(BaseModel):
-    """Fence: conditions of a breach beside uploaded areas, and the action. None: the firmware's default."""
+    """Fence: conditions of a breach beside uploaded areas, and the action.
+
+    A setting that is None takes the firmware's default.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

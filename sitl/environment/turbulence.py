@@ -6,8 +6,10 @@
     L_w = h, L_u = L_v = h/(0.177 + 0.000823 h)^1.2               h in feet, from 10 to 1000
     σ_w = 0.1 W20, σ_u = σ_v = σ_w/(0.177 + 0.000823 h)^0.4       W20: wind at 20 feet
 
-The field is frozen and passes the vehicle with the vehicle's airspeed (Taylor), or with W20 if it is greater:
-this turbulence is caused by a wind of W20, which also acts on a hovering vehicle.
+Φ is the spectrum over the spatial frequency Ω (rad per unit of length), σ a standard deviation, L a length; u
+is along the wind, v across it, w vertical. The field is frozen and passes the vehicle with the vehicle's
+airspeed (Taylor), or with W20 if W20 is greater: the wind W20, which causes this turbulence, also carries it
+past a hovering vehicle.
 """
 
 from __future__ import annotations

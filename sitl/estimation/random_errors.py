@@ -86,7 +86,7 @@ class RandomErrors:
         return Errors((x, y, z), (vx, vy, vz), roll, pitch, yaw, (p, q, r), (drift[0], drift[1], drift[2]))
 
     def _block(self) -> Array:
-        """Return the next rows (_BLOCK, 15) of errors."""
+        """Return the next rows (_BLOCK_SAMPLES, 15) of errors, in the order of the fields of ``Errors``."""
         draws = self._random.standard_normal((_BLOCK_SAMPLES, _DRAWS))
         pole_noise = self._noise_gain @ draws[:, :6].reshape(_BLOCK_SAMPLES, 2, 3)
         bias_noise = self._gain * draws[:, 6 : 6 + _ONE_POLES]

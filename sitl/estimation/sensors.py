@@ -2,8 +2,8 @@
 
 Position, velocity, attitude and body rates are delayed by some milliseconds and have the errors of the
 profile and of GPS faults. Reading the estimate advances nothing: ``advance`` is called on the physics' own
-grid, and the errors change on a fixed grid of 100 Hz. The profile ``truth`` returns the true state at no
-cost.
+grid, and the errors change on a fixed grid of 100 Hz. With the profile ``truth`` and no fault of GPS, the
+estimate is the true state, without any computation of errors.
 """
 
 from __future__ import annotations
@@ -99,7 +99,10 @@ class Sensors:
 
     @property
     def drift(self) -> Vector:
-        """Rate of change (m/s, local NED) of the position error where the estimated velocity lacks it."""
+        """Rate of change (m/s, local NED) of the slow random position error.
+
+        Zero if the estimated velocity contains this rate.
+        """
         return self._errors.drift
 
     def silent(self, now: int) -> bool:
@@ -191,7 +194,7 @@ class Sensors:
 
 
 class _Gaps:
-    """Drop-outs of messages: their starts are a Poisson process, their lengths uniform."""
+    """Drop-outs of messages, of uniformly distributed length, with exponentially distributed pauses."""
 
     def __init__(self, profile: SensorProfile, random: np.random.Generator) -> None:
         self._pause = 60e6 / profile.gaps_per_minute if profile.gaps_per_minute else math.inf

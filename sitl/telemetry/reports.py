@@ -1,6 +1,6 @@
 """Builders of the telemetry messages that companions need: a snapshot in, a message out.
 
-``status_reports`` has the other messages.
+``status_reports`` and ``inertial_reports`` have the other messages.
 """
 
 from __future__ import annotations
@@ -82,9 +82,9 @@ class Snapshot(NamedTuple):
     followed now, or None. ``located``: the estimator has not lost its position (true before the first one);
     ``fixed``: there is GPS; ``test_ratio``: innovation test ratio of the position; ``spread``: σ (m) of the
     position added since the loss of GPS; ``silent``: position messages drop out. ``waking`` 0…1: progress of
-    the reported start-up of GPS and filter; ``charge`` None without a battery;
-    ``throttle`` 0…1; ``unbreached``: MAV_SYS_STATUS_GEOFENCE where it is reported; ``epoch``: Unix time of
-    the boot (µs), 0 if unknown; ``version``: AUTOPILOT_VERSION; ``mission`` returns MISSION_CURRENT,
+    the reported start-up of GPS and filter; ``charge`` None without a battery; ``throttle`` 0…1;
+    ``unbreached``: MAV_SYS_STATUS_GEOFENCE, or 0 if the fence is breached or not reported; ``epoch``: Unix
+    time of the boot (µs), 0 if unknown; ``version``: AUTOPILOT_VERSION; ``mission`` returns MISSION_CURRENT,
     ``fence`` FENCE_STATUS. ``armable``: ready, and armed or without objection to arming. ``lift``: specific
     force of the rotors, or of the ground (m/s²); ``truth``: the true state, site NED.
     """

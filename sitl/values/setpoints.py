@@ -31,7 +31,7 @@ IGNORE_ACCELERATION: Final[int] = (
     | mavlink.POSITION_TARGET_TYPEMASK_AZ_IGNORE
 )
 
-# The lowest derivative that is given for an axis: the level at which its loop closes.
+# Level of an axis: the lowest derivative that a set-point gives for it, which is the quantity controlled.
 POSITION: Final = 0
 VELOCITY: Final = 1
 ACCELERATION: Final = 2
@@ -40,7 +40,8 @@ ZERO: Final[Vector] = (0.0, 0.0, 0.0)
 
 # The conversion to float32 may raise a number at a limit slightly above it.
 _ROUNDING: Final = 1.0 + 1e-6
-# No flight exceeds these; larger numbers are corrupt, and could overflow the float32 fields of the echo.
+# Bounds (SI, rad) that no flight exceeds. Larger numbers are corrupt, and could overflow the float32 fields
+# of POSITION_TARGET_LOCAL_NED (85), which repeats the set-point.
 _MAX_POSITION, _MAX_VALUE, _MAX_YAW_RATE = 1e5, 1e3, 1e2
 _RANGES: Final = (
     ("position", _MAX_POSITION),
@@ -132,7 +133,7 @@ class Stop(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """Not understood or not acceptable: nothing changes."""
+    """Interpretation as not understood or not acceptable: nothing changes."""
 
     reason: str
 

@@ -15,7 +15,7 @@ from sitl.vehicle.ground import GRAVITY
 FloatArray = NDArray[np.float64]
 
 _WEIGHTLESS = 1e-3
-"""Ratio of ‖A‖ to weight below which A has no direction."""
+"""Ratio of ‖A‖ to weight below which A, the force that ``controller`` requests, has no direction."""
 
 
 class Airframe(NamedTuple):

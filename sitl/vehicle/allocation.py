@@ -40,7 +40,10 @@ def _collective_range(rotor_thrusts: FloatArray, airframe: Airframe) -> tuple[fl
 
 @kernel
 def _feasible_tilting(tilting: FloatArray, airframe: Airframe) -> float:
-    """Return the largest part (0…1) of the thrusts ``tilting`` (n,) (N) with a total thrust in all limits."""
+    """Return the largest part (0…1) of the thrusts ``tilting`` (n,) (N) that the rotors can produce.
+
+    With this part, there is a total thrust that keeps each rotor in its limits.
+    """
     part = 1.0
     for i in range(airframe.rotor_x.size):
         for j in range(airframe.rotor_x.size):
@@ -72,8 +75,8 @@ def allocate(thrust: float, moment: Vector, airframe: Airframe, commanded: Float
     """Write the rotor speeds (n,) (rad/s) that give ``thrust`` (N, along −b3) and ``moment`` (N m, body).
 
     This is the least-squares solution by the pseudo-inverse. If a rotor would exceed its limits, yaw is
-    reduced first, then the total thrust. Roll and pitch, which hold the vehicle up, are reduced only if no
-    total thrust is within all limits.
+    reduced first, then the total thrust is lowered or raised. Roll and pitch, which keep the vehicle upright,
+    are reduced only if no total thrust keeps each rotor in its limits.
     """
     n = airframe.rotor_x.size
     for i in range(n):

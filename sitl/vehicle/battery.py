@@ -1,8 +1,8 @@
 """Battery model: rotor speeds in, voltage, current and charge out.
 
 The power of a rotor is proportional to the cube of its speed. A cell's open-circuit voltage falls linearly
-from 4.2 V when full to 3.5 V at a tenth of the charge, and from there to 3.0 V, which approximates lithium
-polymer.
+from 4.2 V when full to 3.5 V at a tenth of the charge, and from there to 3.0 V when empty, which approximates
+a lithium polymer cell.
 """
 
 from __future__ import annotations

@@ -26,13 +26,15 @@ _LEVEL_TILT = 1e-9
 
 @kernel
 def ground_contact(before: Motion, after: Motion, ground: float, airframe: Airframe) -> tuple[Motion, bool]:
-    """Correct a free step from ``before`` to ``after`` if it crossed the plane z = ``ground`` (m, NED).
+    """Correct a free step from ``before`` to ``after`` if it ends with the gear at or below the ground.
 
-    Returns the motion and whether the vehicle stood on the ground. The ground stops the fall without a
-    bounce. The impulse required for that limits, by Coulomb's law, the friction against sliding and turning,
-    and, through the radius of the gear, the impulse that keeps the vehicle level. So a vehicle lifts off as
-    soon as thrust exceeds weight. A vehicle at rest keeps its position to the last bit, because the step is
-    integrated with the mean of the velocities before and after contact, both zero.
+    ``ground`` is the z of the ground (m, NED); the centre of mass is kept ``rest_height`` above it. Returns
+    the motion and whether the vehicle stood on the ground. If the vehicle moves up, only its position is
+    corrected, so it lifts off as soon as thrust exceeds weight. Otherwise the ground stops the fall without a
+    bounce. The impulse that stops the fall limits, by Coulomb's law, the friction against sliding and
+    turning, and, through the radius of the gear, the impulse that keeps the vehicle level. A vehicle at rest
+    keeps its position to the last bit, because the step is integrated with the mean of the velocities before
+    and after contact, both zero.
     """
     floor = ground - airframe.rest_height
     position, velocity, attitude, rates = after

@@ -51,7 +51,7 @@ class Reference(NamedTuple):
 
 
 class VehicleState(NamedTuple):
-    """True state of a vehicle; own copies."""
+    """True state of a vehicle; the arrays are copies, which later steps do not change."""
 
     position: FloatArray  # (3,) m, NED
     velocity: FloatArray  # (3,) m/s, NED
@@ -59,7 +59,7 @@ class VehicleState(NamedTuple):
     body_rates: FloatArray  # (3,) rad/s, FRD
     rotor_speeds: FloatArray  # (n,) rad/s
     acceleration: FloatArray  # (3,) m/s², NED, mean of the last physics step; 0 at rest
-    learnt_force: FloatArray = _ZERO  # (3,) N, NED, estimate of wind and faults, which is countered
+    learnt_force: FloatArray = _ZERO  # (3,) N, NED, estimate of wind and faults; the controller cancels it
 
 
 class NotFiniteError(ValueError):
@@ -143,7 +143,10 @@ def advance_many(
 
 
 def state_of(row: FloatArray) -> VehicleState:
-    """Return the state in a state row (STATE_SIZE + 2 n,), in own copies; failed rotors turn more slowly."""
+    """Return copies of the values in a state row (STATE_SIZE + 2 n,).
+
+    The speed of a failed rotor is the remaining fraction of its motor's speed.
+    """
     row = row.copy()
     motors, left = row[STATE_SIZE:].reshape(2, -1)
     return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], motors * left, row[13:16], row[20:23])
@@ -202,8 +205,8 @@ class Vehicle:
     def fail_rotor(self, index: int, left: float) -> None:
         """Limit the rotor ``index`` (0…n−1) to the fraction ``left`` (0…1) of its motor's speed from now on.
 
-        Its thrust and its torques decrease with the square. The controller receives no indication. Raises
-        IndexError and ValueError.
+        The rotor's thrust and drag torque decrease with the square of ``left``. The controller receives no
+        indication. Raises IndexError and ValueError.
         """
         checked_rotor(self.config, index, left)
         self._left[index] = left

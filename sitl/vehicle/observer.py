@@ -1,9 +1,10 @@
 """Disturbance observer: the force and moment on the vehicle that the controller has not accounted for.
 
 It takes the measurement of an inertial unit (specific force, and angular acceleration by Euler's equation)
-less the values of intact rotors at these motor speeds in still air. The rest (a wind, a failed rotor, a wrong
-mass) passes a first-order low-pass, is limited, and is then cancelled by the controller. It is no integral of
-the control error, so it does not wind up when the rotors cannot produce the requested wrench.
+less the thrust and moment of intact rotors at these motor speeds and the rotor drag that the controller
+cancels. The rest (a wind, a failed rotor, a wrong mass) passes a first-order low-pass, is limited, and is
+then cancelled by the controller. The estimate is no integral of the control error, so it does not wind up
+when the rotors cannot produce the requested wrench.
 """
 
 from __future__ import annotations

@@ -35,11 +35,12 @@ def wrench(
 ) -> tuple[Vector, Vector, float, Vector]:
     """Return the rotors' force (N) and moment (N m), then thrust and moment without faults and drag.
 
-    All are those on the body, in body axes, for motors that turn at ``speeds`` (n,) rad/s. ``left`` (n,) is
-    the remaining fraction of each rotor's speed (0…1). ``air_velocity`` is that of the centre of mass
-    relative to the air (m/s, body), ``rates`` are the body rates. Each rotor gives a thrust k_f ω² along −b3,
-    its drag torque, a rotor drag −c|ω|v⊥ at the hub and a rolling moment −c_r|ω|v⊥, where v⊥ is the hub's
-    velocity through the air in the plane of the rotor.
+    All act on the body and are given in body axes, for motors that turn at ``speeds`` (n,) rad/s. ``left``
+    (n,) is the remaining fraction of each rotor's speed (0…1). ``air_velocity`` is the velocity of the centre
+    of mass relative to the air (m/s, body), ``rates`` are the body rates. A rotor with the speed ω (rad/s)
+    gives a thrust k_f ω² along −b3, a drag torque of size k_m k_f ω², a rotor drag −c|ω|v⊥ at the hub and a
+    rolling moment −c_r|ω|v⊥. Here v⊥ is the hub's velocity through the air in the plane of the rotor, c is
+    ``rotor_drag`` and c_r is ``rolling_moment``.
     """
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     intact_thrust, intact_moment = 0.0, (0.0, 0.0, 0.0)

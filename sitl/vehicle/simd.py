@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sitl.vehicle.airframe import FloatArray
 
 LANES: Final = 8
-"""Doubles in a block: one register of AVX-512, two of AVX2, four of NEON."""
+"""Number of vehicles in a block: eight doubles fill one register of AVX-512, two of AVX2, four of NEON."""
 
 
 def where(condition: bool, a: float, b: float) -> float:

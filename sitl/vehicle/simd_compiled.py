@@ -1,7 +1,7 @@
 """Compilation of ``simd`` by numba: types for eight doubles and for eight conditions, and their operations.
 
-Every lowering is one instruction of LLVM on the whole vector, or a load or a store. Importing this module
-registers it with numba; its names are private.
+Every arithmetic operation is lowered to one instruction of LLVM on the whole vector, every column to one load
+or store. Importing this module registers the types and operations with numba; its names are private.
 """
 # numba has no types, and passes more arguments than a lowering needs:
 # mypy: allow-untyped-calls, allow-untyped-decorators, allow-subclassing-any
@@ -105,7 +105,7 @@ def _exactly(function: Any, result: Any, *arguments: Any) -> None:
 
 
 def _instruction(name: str, *before: str) -> Any:
-    """Return a lowering to one instruction of the builder on ``before`` and the values."""
+    """Return a lowering to the builder's instruction ``name``; the arguments are ``before`` and values."""
 
     def lower(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         return getattr(builder, name)(*before, *values)
@@ -114,7 +114,7 @@ def _instruction(name: str, *before: str) -> Any:
 
 
 def _intrinsic(name: str) -> Any:
-    """Return a lowering to one of LLVM's intrinsics, which keeps the type."""
+    """Return a lowering to the LLVM intrinsic ``name``, whose result has the type of its argument."""
 
     def lower(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         kind = values[0].type

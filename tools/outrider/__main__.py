@@ -49,7 +49,8 @@ def main() -> None:
     """Run the command line.
 
     Bad input ends with status 2 and one line per fault; other errors and interruptions with status 3. A
-    traceback is shown only for an internal fault if OUTRIDER_TRACEBACK is set.
+    traceback is shown only for an internal fault if OUTRIDER_TRACEBACK is set; Python then ends with its own
+    status, 1.
     """
     from mavlink_bridge.errors import BridgeError
 
@@ -72,7 +73,7 @@ def main() -> None:
         sys.stderr.write(f"outrider: {error}\n")
         sys.exit(FAULT)
     except Exception as error:
-        # An internal fault must not have the status of a collision, 1.
+        # Without a traceback an internal fault must not have the status of a collision, 1.
         if os.environ.get("OUTRIDER_TRACEBACK"):
             raise
         sys.stderr.write(f"outrider: {_words(error)}\n")

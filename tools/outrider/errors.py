@@ -31,8 +31,8 @@ class Fault(NamedTuple):
 class InputError(OutriderError):
     """Unusable input of the user.
 
-    The message is one line per fault, in the order given. A fault outside a file, as of an argument, is a
-    plain text.
+    The message is one line per fault, in the order given. A fault outside a file, for example of an
+    argument, is a plain text.
     """
 
     exit_status = 2

@@ -52,8 +52,8 @@ def colours(count: int) -> NDArray[np.uint8]:
 def linear(colour: RGB | NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return sRGB (…, 3) as linear intensities.
 
-    The browser expects these for colours of points and of single meshes among many; one colour for all is
-    sRGB.
+    The browser program of viser expects linear intensities for the colours of batched meshes and of vertices;
+    the one colour of a single mesh is sRGB.
     """
     share = np.asarray(colour) / 255.0
     found = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)

@@ -18,8 +18,9 @@ def config_root() -> Path:
 def find(kind: str, name: str) -> Path:
     """Return the file for ``name``: a path, or the name of a shipped file of ``kind``.
 
-    ``kind`` is a folder of the configuration. Raises InputError with the available names and the nearest one
-    if ``name`` is neither.
+    ``kind`` is a folder of the configuration. Raises InputError for a path (a name with a folder or the
+    suffix of a YAML file) without a file, and, with the available names and the nearest one, for any other
+    name.
     """
     folder = config_root() / kind
     shipped = {path.stem: path for path in sorted(folder.glob("*.yaml"))}

@@ -1,5 +1,5 @@
 """Certified separation: takes the neighbours' committed plans, gives a plan that keeps clear of them.
 
-Both sides hold the committed plans, with moving planes between them. A vehicle replans only with the plans of
-all vehicles that it could meet.
+Of each pair of vehicles, both hold the two committed plans and compute the same moving planes between them. A
+vehicle replans only if it holds the plans of all vehicles that it could meet.
 """

@@ -21,7 +21,7 @@ _MAX_STEPS = 200
 _TOLERANCE = 1e-9
 """Violation of a constraint that is accepted (m, m/s, m/s²)."""
 _FLAT = 1e-11
-"""Curvature along a constraint's normal below which the active constraints determine it."""
+"""Curvature z·n⁺ (see ``binding_rows``) below which n⁺ counts as a combination of the active normals."""
 
 
 @part
@@ -34,7 +34,7 @@ def _inner(a: Array, b: Array) -> float:
 
 @part
 def _add_product(result: Array, x: Array, M: Array) -> None:
-    """Add Mᵀ x to ``result`` (c,); ``M`` (r, c), ``x`` (r,). The same bits on every machine, unlike BLAS."""
+    """Add Mᵀ x to ``result`` (c,); ``M`` (r, c), ``x`` (r,). It has the same bits everywhere, unlike BLAS."""
     for i in range(len(x)):
         if x[i] != 0.0:
             for j in range(len(result)):
@@ -103,7 +103,7 @@ def binding_rows(
             step += 1
             if step > _MAX_STEPS:
                 return -1
-            # Directions of the step: z = H n⁺ − N* r in x, and −r in the multipliers.
+            # Directions of the step: z = H n⁺ − H N r in x, and −r in the multipliers (N: active normals).
             for k in range(count):
                 r[k] = _inner(normals[k], image)
             _solve(gram, count, r, L)

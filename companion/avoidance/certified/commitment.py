@@ -40,9 +40,9 @@ class HoldReason(Enum):
 class Commitment:
     """Owner of ``current``, the plan that is flown, and ``following``, the plan of the next epoch once made.
 
-    An epoch (µs) is a whole number of knots. ``program`` solves for plans, ``deadlock_turn`` is updated by
-    them, and the constraints are passed with each plan. ``held`` counts, by reason, how often the plan was
-    carried on; ``anchored_anew`` how often planning restarted at the measured motion.
+    An epoch (µs) is a whole number of knots. ``program`` solves for plans, and each solved plan updates
+    ``deadlock_turn``. ``origin``: fingerprint of the fleet frame, for the wire. ``held`` counts, by reason,
+    how often the plan was carried on; ``anchored_anew`` how often planning restarted at the measured motion.
     """
 
     def __init__(
@@ -177,7 +177,7 @@ class Commitment:
         return self._horizon_cache[2]
 
     def announced(self) -> WirePlan | None:
-        """Return the plan to announce now: the next epoch's once it is made; None without any plan."""
+        """Return the plan to announce: the next epoch's or, until that is made, the current one; or None."""
         return self.current if self.following is None else self.following
 
     def _last_acceleration(self) -> Array:

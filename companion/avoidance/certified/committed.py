@@ -62,7 +62,8 @@ def committed(start: WirePlan, accelerations: Array) -> WirePlan:
 def rounding(steps: int, dt: int) -> Array:
     """Return upper bounds (n, 3), m, on how far rounding moves the control points of a plan.
 
-    Each acceleration is off by half a unit at most on each axis.
+    Each acceleration but the last is off by half a unit at most on each axis. The last one cancels the sum of
+    these errors, so the bounds hold with it, too.
     """
     n = np.arange(steps)
     units = np.stack([n**2, n**2 + n, (n + 1) ** 2], axis=1)

@@ -50,9 +50,9 @@ class ConstraintSources:
         """
         plans = [filed.controls for filed in peers.plans(epoch).values()]
         aside = self._beside_last_plan(now, peers, world)
-        # A vehicle that said farewell may drift while it descends. One that is further from its last plan may
-        # be flown by another controller, at any height: it counts as non-cooperative while it sends. Once it
-        # is silent it counts as landed where it was, because it may be switched off.
+        # A vehicle that said farewell may drift while it descends. One that is further than ``between`` from
+        # its last plan may be flown by another controller, at any height: it counts as non-cooperative while
+        # it sends. Once it is silent it counts as landed at its last position, as it may be switched off.
         taken_over = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
         members = peers.members.union(peers.left.keys() - taken_over)
         begins = epoch + self._config.certified.epoch_us

@@ -1,15 +1,17 @@
 """Deadlock turn: resolves deadlocks in which plans certify each other.
 
-A deadlock begins at the rest points, where the plans end, before the vehicles themselves are stuck: after a
-second the rest points form a tight ring, each wedge of planes opens outward, and staying is the optimum. If a
-vehicle's planes push its plan back while its rest point makes no progress, the goal is turned aside about the
-vehicle, for all vehicles to the same side, and back again when the push is gone. Only the cost changes, by
-the vehicle's own solutions; the constraints that certify separation do not.
+A deadlock begins at the rest points, where the plans end, before the vehicles themselves stop. For example,
+vehicles meet in the middle: after a second their rest points lie on a small circle, the planes let each rest
+point move outward only, and the plan that stays is optimal. If a vehicle's planes push its plan back while
+its rest point makes no progress, the goal is turned aside about the vehicle, for all vehicles to the same
+side, and back again when the push is gone. The turn changes only the cost, and depends only on the vehicle's
+own solutions. The constraints that certify separation do not change.
 
-The push is F = Σ λ c, the sum of the planes' rows times their multipliers. The blocking is
+The push is F = Σ λ c, the sum of the planes' normals c times the multipliers λ of their rows. The blocking is
 b = clip(−F·d / (G · L), 0, 1) · clip(1 − v_L/v, 0, 1). d and L are the direction and the distance of the goal
 from the rest point, G is the gradient of the cost per metre of error, v_L the speed at which L falls, and v
-the setting ``deadlock.speed``.
+the setting ``deadlock.speed``. If b exceeds ``deadlock.pushed`` the turn grows at a rate proportional to b;
+otherwise it decreases.
 """
 
 from __future__ import annotations

@@ -80,11 +80,12 @@ class CertifiedFlight:
                 self.peers.refused += 1
 
     def stand(self, now: int, position: Array) -> None:
-        """While not in control, hold ``position`` (3,), m, unannounced until the vehicle steers.
+        """While not in control, continue the committed plan, or hold ``position`` (3,), m.
 
         The committed plan continues if the vehicle is within ``certified.tube`` (m) of it, or if it is
         announced for this epoch or a later one, because others rely on it. Otherwise a plan at rest at
-        ``position`` begins; ``anchored_anew`` counts this if a plan had been announced.
+        ``position`` begins, which is not announced before the companion is in control; ``anchored_anew``
+        counts this if a plan had been announced.
         """
         self._polled_at = now
         commitment, horizon = self.commitment, self.commitment.horizon()
@@ -101,8 +102,8 @@ class CertifiedFlight:
     def due(self, now: int) -> bool:
         """Begin the next epoch if it is time; return True if ``plan`` is to be called for it now.
 
-        That is when the clocks agree and the plans of all peers have arrived. At the latest possible time
-        without them, the committed plan is continued for an epoch, and the result is False.
+        That is when no member's clock is wrong and ``peers.missing`` is empty. Otherwise the result is False,
+        and at the last call (``Commitment.last_call``) the committed plan is continued for an epoch.
         """
         self._polled_at, self._in_control = now, True
         if not self.commitment.turn(now):

@@ -1,7 +1,8 @@
 """Distances that plans must keep, and balls that hold non-cooperative vehicles.
 
 The guarantee is about true positions, and plans differ from them. Each of two vehicles differs by the tube
-(its autopilot's tracking error), by k·σ of its estimate, and by v_max times the error of its clock.
+(its autopilot's tracking error), by k·σ of its position estimate (k: ``certified.sigmas``), and by ‖v_max‖
+times the error of its clock.
 """
 
 from __future__ import annotations

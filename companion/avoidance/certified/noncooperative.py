@@ -100,8 +100,8 @@ class NonCooperative:
         """Return centres and least distances, as ``balls`` does, for the target if it is an obstacle.
 
         ``view`` is that of ``now`` (µs); the epoch begins at ``begins`` (µs). The target is assumed to keep
-        its speed and turn rate; no ball grows about it. A target that falls silent stays at its last
-        extrapolated position.
+        its speed and turn rate, so the least distance from it does not grow with time. A target that falls
+        silent stays at its last extrapolated position.
         """
         if view.target_last is None or self._target is None:
             return []

@@ -2,11 +2,11 @@
 
 A vehicle replans in an epoch only if it holds the plan of that very epoch of every member of its coordination
 set, and each of these has this vehicle in its own coordination set (``missing`` is empty). An older plan is
-not enough, because its sender may have made another since. A sender of a plan or a roster is a member
-until its farewell, and so are the members in its latest roster. A vehicle that
-said farewell flies its last plan to the end and stays there. A farewell is accepted only if the plan of its
-epoch is held, because an older plan may end elsewhere; and only for as long as such a plan is accepted,
-because its sender may have joined again since.
+not enough, because its sender may have made another since. Members are the expected vehicles, the senders of
+plans or rosters, and the vehicles in the latest roster of each sender, all until their farewell. A vehicle
+that said farewell flies its last plan to the end and stays there. A farewell is accepted only if the plan of
+its epoch is held, because an older plan may end elsewhere; and only until four epochs (``_MAX_EPOCHS``) after
+the beginning of its epoch, because its sender may have joined again since.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ class PeerPlans:
         self._steps, self._dt, self._epoch, self._origin = steps, dt, epoch, origin
         self._plans: dict[int, dict[int, StoredPlan]] = {}
         self._rosters: dict[int, Roster] = {}
-        # Epoch (µs) from which on each peer counts this vehicle, and the earliest epoch (µs) of rosters from
-        # which that is learnt.
+        # Epoch (µs) from which on each peer has this vehicle in its coordination set, and the earliest epoch
+        # (µs) of rosters from which this is learnt.
         self._counted: dict[int, int] = {}
         self._earliest_counted_epoch = 0
         self._left: dict[int, StoredPlan] = {}
@@ -79,8 +79,9 @@ class PeerPlans:
     def receive_plan(self, now: int, system: int, payload: bytes) -> None:
         """Receive a TUNNEL payload of kind plan.
 
-        Refuses and counts a plan that does not end at rest, has other settings, is too far from ``now`` or
-        differs from the stored plan of its epoch.
+        Refuses and counts a plan that cannot be decoded, does not end at rest, differs from this vehicle's
+        settings (frame, dt, steps, epoch), is too far from ``now``, or differs from the stored plan of its
+        epoch.
         """
         # Most payloads repeat the last one.
         if system == self._own or self._last.get(system) == payload:
@@ -116,8 +117,8 @@ class PeerPlans:
         """Receive a roster: the coordination set of ``system``, or its farewell.
 
         A farewell means that the sender's plan of that epoch is its last. It is repeated for receivers that
-        do not hold that plan yet or are not in that epoch yet. A late farewell has no effect: a sender that
-        has joined again since makes plans.
+        do not hold that plan yet or are not in that epoch yet. A late farewell has no effect, because its
+        sender may have joined again since, and then makes plans.
         """
         if system == self._own:
             return

@@ -7,9 +7,10 @@ follow a lasting push with its accelerations. The plan ends at rest.
 
 Bounds of acceleration are bounds on variables. Limits of speed and position and the planes are rows Ga ≥ low.
 A row is a candidate if the committed plan is within ``_NEAR`` of it, or if the best plan without rows or an
-earlier solution violates it. The QP holds the candidates that bind (``binding_rows``), and its solution is
-checked against all rows. A limit that the committed plan violates is relaxed until the plan satisfies it,
-so that this plan is feasible in every problem.
+earlier solution violates it. The QP holds the candidates that bind, or all candidates if ``binding_rows``
+finds no solution. Its solution is checked against all rows, and the next QP holds the rows that it violates.
+A limit that the committed plan violates is relaxed until the plan satisfies it, so that this plan is feasible
+in every problem.
 """
 
 from __future__ import annotations
@@ -93,12 +94,13 @@ class SeparationQp:
         S_v, self._S_x, _ = prediction(n, dt)
         self.dt, self.S_v = dt, np.ascontiguousarray(S_v)
         v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self.S_v, self._S_x))
-        # Control point b of segment i, depending on a, (3, n, n), and on time where a = 0, (n, 3).
+        # ``maps[b] @ a``: what the accelerations a add to control point b of each segment, (3, n, n);
+        # ``_times``: the times (s) of the control points since the beginning, (n, 3).
         self.maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x])
         self._times: Array = dt * (np.arange(n)[:, None] + np.array([0.0, 0.5, 1.0]))
         self._weights = np.full(n, config.omega_place)
         self._weights[-1] = config.omega_end
-        # a_n − a_{n−1}; before the first is the acceleration flown until then.
+        # ``change @ a``: a_k − a_{k−1}; for k = 0, ``_cost`` subtracts the acceleration flown until then.
         change = np.eye(n) - np.eye(n, k=-1)
         one = 2.0 * (
             self._S_x.T @ (self._weights[:, None] * self._S_x)
@@ -114,7 +116,7 @@ class SeparationQp:
         self._without_rows: Array = inverse[: 3 * n]
         self._inverse: Array = np.ascontiguousarray(inverse[: 3 * n, : 3 * n])
         self.gradient_per_metre = 2.0 * float(self._weights.sum())
-        """Cost gradient at a plan that is one metre from all its preferred places."""
+        """Derivative of the cost by a shift of the whole plan, one metre from all its preferred places."""
         a_max = np.array(limits.u_max) - _ROUNDED
         if planar:
             # The heights stay almost constant: an interior-point method needs an interior.
@@ -130,7 +132,8 @@ class SeparationQp:
     def solve(self, state: State, objective: Objective, planes: Planes) -> Answer:
         """Return the best plan from ``state`` that keeps all rows.
 
-        Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs.
+        Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs or although
+        the QP holds them.
         """
         c = self._cost(state, objective)
         rows = _Rows(self, state, planes)

@@ -1,8 +1,9 @@
 """Rows of the certified QP as kernels: limits of speed and position, and separating planes.
 
 Row r = kind·3n + axis·n + step of the limits: the kinds are +v and −v after the step, and the control points
-+q₁, −q₁, +q₂, −q₂ of its segment. The rows of plane m follow, in the order of step and control point: c·q_i.
-A segment begins at q₀ = p with velocity v; q₁ = p + ½ dt v, q₂ = p + dt v + ½ dt² a.
++q₁, −q₁, +q₂, −q₂ of its segment. The rows of plane m follow, in the order of step and control point: c·q_i,
+with c the plane's normal. A segment begins at q₀ = p with velocity v; q₁ = p + ½ dt v, q₂ =
+p + dt v + ½ dt² a.
 """
 
 from __future__ import annotations

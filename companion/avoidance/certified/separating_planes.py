@@ -8,10 +8,11 @@ point i must satisfy
 
     c·q_i ≥ c·(own_i + other_i)/2 + min(d, c·r_i)/2,
 
-and the neighbour's the same from the other side. So any two new plans are min(d, c·r_i) apart along c at
-every control point, hence everywhere on the segment (a Bézier curve lies in the hull of its control points).
-The committed plan itself satisfies it, with room max(c·r_i − d, 0)/2. Obstacles that share no plan get the
-whole margin from the own side.
+where own_i and other_i are the control points of the two committed plans, and d is the least distance. The
+neighbour's new plan must satisfy the same from the other side. So any two new plans are min(d, c·r_i) apart
+along c at every control point, hence everywhere on the segment (a Bézier curve lies in the hull of its
+control points). The committed plan itself satisfies it, with room max(c·r_i − d, 0)/2. For an obstacle that
+shares no plan the own side keeps the whole distance.
 """
 
 from __future__ import annotations
@@ -43,8 +44,9 @@ class Others(NamedTuple):
 class Planes(NamedTuple):
     """Normals c (M, n, 3), and the least c·q for each control point (M, n, 3).
 
-    ``least`` is what must hold; ``wanted`` is slightly more where the committed plan has it, so that rounding
-    breaks nothing. ``room`` (M, n, 3): by how much the committed plan holds.
+    ``least`` is what must hold; ``wanted`` is slightly more where the committed plan allows it, so that a
+    rounded plan still keeps ``least``. ``room`` (M, n, 3), m: by how much the committed plan exceeds
+    ``least``.
     """
 
     normals: Array
@@ -59,7 +61,7 @@ def planes(own: Array, others: Others, spare: float, *, upright: bool = False) -
     ``spare`` (m) is wanted beyond the least distance. ``upright``: heights do not count.
     """
     found = Planes(*(np.empty((*others.distance.shape, 3)) for _ in Planes._fields))
-    # One call of the kernel needs contiguous arrays; those of a flight are.
+    # The kernel needs contiguous arrays; those of a flight are contiguous already.
     own, controls, distance = map(np.ascontiguousarray, (own, others.controls, others.distance))
     _planes(own, controls, distance, others.shares, spare, upright, *found)
     return found
@@ -76,10 +78,11 @@ def along(normals: Array, points: Array) -> Array:
 
 
 def nearest(triangles: Array) -> Array:
-    """Return unit vectors (k, 3) from the origin to the nearest point of each triangle (k, 3, 3).
+    """Return unit vectors (k, 3) from the origin towards the nearest point of each triangle (k, 3, 3).
 
-    The interior of a flat triangle is of no use: of edges and interior, the one that holds the triangle
-    further off counts. A triangle about the origin gets some unit vector: nothing separates it.
+    Of the directions of the nearest points of the edges and of the normal of the triangle's plane, it is the
+    one along which the whole triangle is furthest from the origin. A triangle that contains the origin gets
+    an arbitrary unit vector, because no plane separates the two.
     """
     found = np.empty((len(triangles), 3))
     _nearest_all(np.ascontiguousarray(triangles), found)
@@ -103,8 +106,8 @@ def _nearest(triangle: Array, candidate: Array, best: Array) -> None:
     """Write ``nearest`` of one ``triangle`` (3, 3) to ``best`` (3,); ``candidate`` (3,) is scratch memory.
 
     The candidates are the nearest points of the three edges and the normal of the triangle's plane, all of
-    unit length. One that is nearly zero stays zero: a fixed direction instead would win now and then by a
-    rounding error, on one side only.
+    unit length. A candidate that is nearly zero becomes zero: a fixed direction in its place could be chosen
+    because of a rounding error, by one of the two vehicles only.
     """
     furthest = -np.inf
     best[:] = 0.0

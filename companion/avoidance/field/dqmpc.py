@@ -3,14 +3,15 @@
 Deviations from the paper. The variable is the total acceleration a = u + f, because cost and dynamics depend
 on nothing else: f only shifts the bounds, a ∈ [f + u_min, f + u_max]. Gravity is absent: u is relative to
 hover, and the vehicle's controller carries the weight (with g in the dynamics and |u| ≤ 2 the problem has no
-solution). The vehicle's own bound, ‖u + f‖ ≤ a_total, holds for every solution: the box is shrunk from
-outside until its far corner lies in that ball.
+solution). The vehicle's own bound, ‖u + f‖ ≤ a_total, holds for every solution, unless the bounds on jerk
+contradict it: the box of a is cut to |a_i| ≤ |f_i| + u_max,i, scaled down until its corners lie in that ball.
 
 Box and speed limits have priority over the field. Where the bounds shifted by f leave no input that keeps
 these limits, the bounds are opened towards what the vehicle can do: first as late in the horizon as possible,
-so that a vehicle still evades with full force until it is fast enough (``_late``), and then as little as
-necessary. Only a limit that even this cannot keep is widened to what is reachable, so that every QP has a
-solution. With ``j_max`` the jerk is bounded, too (``jerk``).
+so that a vehicle evades with the full field until its speed or its braking distance allows no more
+(``_late``), and then as little as necessary. Only a limit that even this cannot keep is widened to what is
+reachable. A QP that still has no solution is solved without state limits (``solve``). With ``j_max`` the jerk
+is bounded, too (``jerk``).
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ _TOLERANCE = 1e-7
 _SPARE, _SLOWER, _INSIDE = 0.5, 0.02, 0.05
 """Margins where bounds yield to limits.
 
-They are the share of the braking that is counted on, m/s below v_max, and m inside the box.
+They are the share of the largest deceleration that is counted on, m/s below v_max, and m inside the box.
 """
 _WIDEN = 0.01
-"""Share of the reach by which an unreachable bound is widened: an interior-point method needs an interior."""
+"""Share of the reachable range by which bounds open more than necessary: PIQP needs an interior."""
 
 
 class AxisQp(NamedTuple):
@@ -57,8 +58,8 @@ class Problem(NamedTuple):
     """Vectors of the three QPs, (3, n) and (3, 2n).
 
     They are c, the bounds of a, and the bounds of velocities and positions 1…N + 1. ``far`` (3, n): the
-    largest |a| that the vehicle has on that axis, in either direction: |f| + u_max, scaled to a_total.
-    ``flown``: the motion that the plan continues, where jerk is bounded.
+    largest |a| that the vehicle has on that axis, in either direction: |f| + u_max, scaled to at most a_total
+    in norm. ``flown``: the motion that the plan continues, where jerk is bounded.
     """
 
     c: Array
@@ -112,7 +113,7 @@ class Dqmpc:
                 (np.array(limits.v_max), limits.box_max),
             )
         )
-        # [x − x̌, v − v̌] at the end (3, 2) times this gives c, for Ω_t as configured.
+        # [x − x̌, v − v̌] (3, 2) at the end for a = 0, times this, gives c for Ω_t as configured.
         weights = 2.0 * np.array([cost.omega_t_position, cost.omega_t_velocity])
         self._pull: Array = weights[:, None] * np.vstack([self.S_x[-1], self.S_v[-1]])
         self._ratio_i = cost.omega_i / cost.omega_t_position
@@ -122,7 +123,8 @@ class Dqmpc:
     def hessian(self, omega_scale: float) -> Array:
         """Return P = 2(Ω_i I + Ω_x s_x s_xᵀ + Ω_v s_v s_vᵀ), with Ω_x and Ω_v times ``omega_scale``.
 
-        PIQP works best with weights between 1e2 and 1e3.
+        s_x and s_v (n,) map a to position and velocity at the end. PIQP works best with weights between 1e2
+        and 1e3.
         """
         s_x, s_v = self.S_x[-1], self.S_v[-1]
         w = self.cost
@@ -180,7 +182,7 @@ class Dqmpc:
         """Return the problem with state limits that can be kept.
 
         First the bounds on a are opened for the limits, as late and as little as necessary. A limit that no
-        input keeps even then is widened to slightly beyond what is reachable.
+        input keeps even then is widened until some inputs keep it, with a small margin.
         """
         _, x_l, x_u, h_l, h_u, far, flown = problem
         least, most = -far, far
@@ -215,11 +217,11 @@ class Dqmpc:
     def _late(
         self, pushed: Array, least: Array, room: Array, v: Array, flown: Flown | None, side: float
     ) -> Array:
-        """Return accelerations (3, n) as ``pushed`` (3, n) until speed or braking distance allow no more.
+        """Return accelerations (3, n): ``pushed`` (3, n), or less where speed or braking distance require it.
 
-        They point towards a ``side`` (1 up, −1 down) that is ``room`` (3,) m away, approached at ``v`` (3,)
-        m/s. Without a bound on jerk they are not less than ``least`` (3, n); with one, their changes stay
-        within it.
+        Positive values point towards one limit of the box on each axis (``side`` 1: the upper, −1: the
+        lower), which is ``room`` (3,) m away and is approached at ``v`` (3,) m/s. Without a bound on jerk the
+        accelerations are not less than ``least`` (3, n); with one, their changes stay within it.
         """
         found = np.empty_like(pushed)
         jerk, step, last = _NO_JERK, self.dt, np.zeros(3)
@@ -311,10 +313,10 @@ class Dqmpc:
     def _bounded(
         self, solver: QpSolver, jerk: JerkRows, problem: Problem, i: int, low: Array, high: Array
     ) -> tuple[Array, bool]:
-        """Solve one axis with bounds on a and on jerk; return whether these contradict each other, too.
+        """Solve one axis with bounds on a and on jerk; also return whether these contradict each other.
 
-        If they do, the bounds on jerk hold, and a comes as near as they allow to the smallest one within its
-        own bounds.
+        If they do, the bounds on jerk hold, and a follows, as fast as they allow, the acceleration of the
+        smallest magnitude within the bounds on a.
         """
         try:
             return solver.solve(problem.c[i], problem.x_l[i], problem.x_u[i], low, high), False
@@ -325,8 +327,9 @@ class Dqmpc:
     def gradient(self, a: Array, x_end: Array, v_end: Array, destination: Array, velocity: Array) -> Array:
         """Return ∇J = ∂J/∂x(N+1) + ∂J/∂u(N), eq. (11), as a vector (3,), divided by Ω_t (Sec. III-D.1).
 
-        The paper adds a state gradient and an input gradient; both are taken in position space here, and the
-        division makes k_s and k_tang fit any scale of the weights. The gradient vanishes at the destination.
+        The paper adds a state gradient and an input gradient, which differ in size: here the state gradient
+        is the one by the position alone. The division makes k_s and k_tang fit any scale of the weights. The
+        gradient vanishes for a plan that ends at the destination with the terminal velocity and a(N) = 0.
         """
         found = np.empty(3)
         _gradient(a[-1], x_end, v_end, destination, velocity, self.dt, self._ratio_i, self._ratio_v, found)
@@ -343,7 +346,7 @@ class Dqmpc:
 
 _NO_JERK = np.zeros(3)
 _NO_JERK.flags.writeable = False
-"""Bounds on jerk that stand for none."""
+"""Value of the bounds on jerk if jerk is not bounded."""
 _ALL = 0b111
 """Bits of the three axes."""
 
@@ -511,7 +514,7 @@ def _late(
             if jerk == 0.0:
                 a = max(min(a, rest / dt), least[i, k])
             else:
-                # v + dt a + a²/2j, the speed when a has come back to zero, stays below.
+                # The speed when a has come back to zero, v + dt a + a²/(2 jerk), stays below the limit.
                 if rest > 0.0:
                     a = min(a, jerk * (sqrt(dt * dt + 2.0 * rest / jerk) - dt))
                 else:

@@ -2,19 +2,19 @@
 
 F(d) = K · (π/2)/(d_safe − d_min) · (cot z + z − π/2),  z = (π/2)(d − d_min)/(d_safe − d_min)
 
-Deviations from the paper: the force points *away* from the obstacle (the printed α points towards it). Below
-d_min the formula turns negative, so it is clamped there, far above what the vehicle has. The sum is limited
-to a_total, not its parts: otherwise an obstacle that pushes from behind would cancel one that is about to be
-hit.
+d is the distance from the obstacle and K the gain. Deviations from the paper: the force points *away* from
+the obstacle (the printed α points towards it). Below d_min the formula turns negative, so F has a constant
+value there, far above the vehicle's largest acceleration. The sum is limited to a_total, not its parts:
+otherwise an obstacle that pushes from behind would cancel one that is about to be hit.
 
 Closing speed. From d_safe = 3 m the bare field cannot stop two vehicles that meet at 5 m/s each: that takes
 about 10 m/s² net. So the distance that enters F is what would be left after braking, d − ċ²/(2 a_rel) with ċ
 the closing speed and a_rel the relative deceleration to count on. At rest this is the paper's field; at a
 high closing speed its reach grows with the square of the speed, and d_min is approached no faster than the
 vehicle can brake. With bounded jerk a vehicle brakes late: ``reaction`` seconds of closing are subtracted,
-too. Where the distance grows the term is added, until the distance from d_min is doubled: a field that pushes
-as hard on the way out as on the way in throws vehicles out of every encounter. ``braking=None`` is the
-paper's field alone.
+too. Where the distance grows the term is added, until the distance from d_min is doubled: otherwise the field
+would push vehicles that separate as hard as vehicles that approach, and accelerate them after every
+encounter. ``braking=None`` is the paper's field alone.
 """
 
 from __future__ import annotations

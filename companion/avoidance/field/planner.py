@@ -1,4 +1,4 @@
-"""Planner: destination → forces → QP → plan, Algorithm 1 of the paper on one screen."""
+"""Planner: destination → forces → QP → plan, Algorithm 1 of the paper."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Plan(NamedTuple):
 
 
 class Planner:
-    """Planner of one vehicle; keeps its gradient and what its methods latch."""
+    """Planner of one vehicle; keeps the last gradient, the last field, and what the methods latch."""
 
     def __init__(self, config: CompanionConfig) -> None:
         self.config = config
@@ -155,10 +155,10 @@ class Planner:
         return influence._replace(force=self._smoothed(elapsed, influence.force))
 
     def _smoothed(self, elapsed: float, force: Array) -> Array:
-        """Return the field within its limit, and without its steps.
+        """Return the field limited to a_total, and smoothed in time.
 
-        Neighbours' plans arrive at 10 Hz, and their steps would jolt the attitude. With bounded jerk the
-        field changes no faster than the acceleration may, in time and along the horizon.
+        Neighbours' plans arrive at 10 Hz; each would cause a step of the field and of the attitude. With
+        bounded jerk the field changes no faster than the acceleration may, in time and along the horizon.
         """
         config, dt = self.config, self.dqmpc.dt
         j_max, smoothing = config.limits.j_max, config.field.smoothing_us

@@ -21,8 +21,8 @@ class Step(Enum):
 class Shaping(NamedTuple):
     """Dynamics of a trajectory that follows the set-points.
 
-    Its acceleration changes by at most ``jerk`` (m/s³). Velocity errors are corrected with the gain
-    ``velocity``, position errors with the gain ``position`` (1/s).
+    The acceleration of the trajectory changes by at most ``jerk`` (m/s³). Velocity errors are corrected with
+    the gain ``velocity`` (1/s), position errors with the gain ``position`` (1/s).
     """
 
     jerk: float
@@ -33,10 +33,11 @@ class Shaping(NamedTuple):
 class Loop(NamedTuple):
     """Default gains of an autopilot's horizontal position loop.
 
-    The loop asks for the velocity v_r + ``position`` · position error (1/s), and for the acceleration a_r +
-    ``velocity`` · velocity error (1/s). ``slew`` (m/s³): largest rate of change of the compensation that is
-    added to a_r. ``shaping``: for an autopilot that follows set-points with a trajectory. ``offset_s``: time
-    constant (s) of the estimated velocity offset, which the velocity set-point compensates; 0: no
+    With v_r and a_r the velocity and the acceleration of the set-point, the loop asks for the velocity v_r +
+    ``position`` (1/s) · position error, and for the acceleration a_r + ``velocity`` (1/s) · velocity error.
+    ``slew`` (m/s³): largest rate of change of the compensation that is added to a_r. ``shaping``: dynamics of
+    the trajectory with which the autopilot follows set-points; None if it uses no trajectory. ``offset_s``:
+    time constant (s) of the estimated velocity offset, which the velocity set-point compensates; 0: no
     compensation. ``lead_us``: lag of the attitude (µs), by which the acceleration of set-points is sent
     ahead. ``pull`` (1/s): rate at which the velocity set-point corrects the position in addition to the loop.
     """
@@ -58,13 +59,13 @@ class Profile(NamedTuple):
 
     ``guided_custom_mode``: custom_mode of HEARTBEAT in which the vehicle follows set-points; ``guided_name``:
     the name of that mode. ``streams_first``: set-points must be streamed before the mode is granted, and
-    before its pre-arm checks pass in it. ``takeoff_absolute``: NAV_TAKEOFF takes an altitude above mean sea
-    level, not above home. ``hold_params``: p1…p3 of DO_SET_MODE for the mode in which the autopilot holds its
-    position by itself, ``hold_mode`` and ``hold_name``. ``fallen_modes``: possible values of custom_mode
-    after set-points were missing for too long; ``loss_modes``: those in which no pilot flies.
-    ``takeoff_modes`` and ``land_modes``: the modes to which NAV_TAKEOFF, where it changes the mode, and
-    NAV_LAND lead. ``loop``: how the autopilot follows set-points. ``bytewise``: PARAM_VALUE holds the bytes
-    of an integer parameter, not its value as a float.
+    before the pre-arm checks pass in this mode. ``takeoff_absolute``: NAV_TAKEOFF takes an altitude above
+    mean sea level, not above home. ``hold_params``: p1…p3 of DO_SET_MODE for the mode in which the autopilot
+    holds its position by itself; ``hold_mode`` and ``hold_name``: custom_mode and name of that mode.
+    ``fallen_modes``: possible values of custom_mode after set-points were missing for too long;
+    ``loss_modes``: those in which no pilot flies. ``takeoff_modes`` and ``land_modes``: the modes to which
+    NAV_TAKEOFF, where it changes the mode, and NAV_LAND lead. ``loop``: how the autopilot follows set-points.
+    ``bytewise``: PARAM_VALUE holds the bytes of an integer parameter, not its value as a float.
     """
 
     name: str

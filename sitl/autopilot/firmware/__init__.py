@@ -1,8 +1,9 @@
 """Differences between ArduPilot and PX4, behind one small interface.
 
-The commander receives requests; a flavour decides whether they are allowed, numbers the modes and interprets
-set-points. Everything here is pure: it takes ``Status`` and returns verdicts. Sources: ArduCopter 4.6.3 and
-PX4 1.16.1 as flown and measured.
+The commander receives requests; a ``Firmware`` (elsewhere called *flavour*) decides whether they are
+allowed, numbers the modes and interprets set-points. Apart from ``configure``, its methods are pure: the
+results depend on the arguments and the settings only. Sources: measurements in flights of ArduCopter
+4.6.3 and PX4 1.16.1.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from sitl.vehicle.battery import Charge
 
 
 class Mode(Enum):
-    """Meaning of a mode; a flavour gives it its number."""
+    """Flight mode, independent of the firmware; a ``Firmware`` maps it to a number."""
 
     STANDBY = "standby"
     POSITION = "position"
@@ -37,7 +38,7 @@ ACTIONS: Final = {"warn": None, "hold": Mode.HOLD, "land": Mode.LAND, "return": 
 
 
 def limit(setting: float | None, usual: float) -> float:
-    """Return a limit (m): ``usual`` if ``setting`` is None, infinity if it is 0."""
+    """Return ``setting`` (m), or ``usual`` if it is None; a result of 0 becomes infinity (no limit)."""
     return (usual if setting is None else setting) or math.inf
 
 
@@ -107,9 +108,10 @@ class Firmware(Protocol):
     after_takeoff: Mode
     after_landing: Mode
     keeps_choice: bool
-    """Whether disarming restores the last chosen mode in which arming is allowed.
+    """Whether disarming restores the last chosen mode.
 
-    If so, GUIDED resumes when its set-points resume.
+    A mode chosen while armed counts only if arming is allowed in it. If True, GUIDED also resumes after a
+    time-out when set-points arrive again.
     """
     after_return: Mode
     after_mission: Mode
@@ -185,8 +187,9 @@ class Firmware(Protocol):
     ) -> Takeoff | CommandRefusal:
         """Decide on NAV_TAKEOFF (22) to ``altitude`` (m; NaN if not given).
 
-        ``altitude`` is above home if ``relative`` is True, above mean sea level if False; None if the message
-        has no frame. ``ground``: home's altitude above mean sea level (m).
+        ``altitude`` is above home if ``relative`` is True, above mean sea level if False; ``relative`` is
+        None if the message has no frame or another one. ``ground``: home's altitude above mean sea level
+        (m).
         """
         ...
 

@@ -1,8 +1,8 @@
 """Progress through a mission: the choice of the current item and its execution.
 
-Items that take time (NAV) are flown one after the other; those between them (DO) are executed on the way. The
-guidance moves the vehicle: a waypoint is a destination with a speed, and is reached when the estimate is
-within the acceptance radius.
+Items that take time (NAV) are flown one after the other. The items between them (DO) are executed at once,
+before the next NAV item begins. The guidance moves the vehicle: a waypoint is a destination with a speed, and
+is reached when the estimate is within the acceptance radius.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _HEIGHT_TOLERANCE: Final = 0.3
 # Distance (m) below which there is no bearing to turn to.
 _MIN_BEARING_DISTANCE: Final = 1.0
 _FOR_EVER: Final = -1
-# Air and ground speed are treated alike, because guidance ignores wind.
+# An air speed is treated as a ground speed, because the speed limits of the guidance ignore the wind.
 _SPEEDS: Final = (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED)
 
 
@@ -75,8 +75,8 @@ class Itinerary:
         """Set the firmware's mission rules.
 
         ``first`` is the first item to fly; item 0 is home for ArduPilot. ``px4``: a mission that begins on
-        the ground without a takeoff takes off all the same, and a waypoint may set its own radius (parameter
-        2) and heading (4).
+        the ground without a takeoff takes off all the same; a waypoint may set its own radius (parameter 2,
+        m), and every item that has a place, except a landing, the heading (parameter 4, degrees).
         """
         self._plans = plans
         self._guidance = guidance
@@ -126,7 +126,7 @@ class Itinerary:
     def replaced(self) -> None:
         """Handle the replacement of the mission: begin anew.
 
-        ArduPilot in flight continues with the item of the same number.
+        ArduPilot in flight continues with the item of the same number, if the new mission has one.
         """
         if self._px4 or self._guidance.activity is Activity.IDLE or self.current >= len(self._items):
             self.rewind()
@@ -146,7 +146,7 @@ class Itinerary:
         return True
 
     def set_speed(self, speed: float | None) -> None:
-        """Continue at ``speed`` (m/s); None restores the default."""
+        """Fly at ``speed`` (m/s) from the next item on; None restores the default."""
         self._speed = speed
 
     def pause(self) -> None:
@@ -298,7 +298,10 @@ class Itinerary:
         return min(speed, limit * length / abs(rise)) if rise else speed
 
     def _yaw(self, item: Item, here: Estimate) -> float | None:
-        """Return the yaw (rad): along the leg, or PX4's parameter 4 (degrees)."""
+        """Return the yaw (rad): PX4's parameter 4 (degrees) if given, else along the leg.
+
+        None, which keeps the yaw, if the leg is horizontally no longer than ``_MIN_BEARING_DISTANCE``.
+        """
         if self._px4 and math.isfinite(item.params[3]) and item.command != mavlink.MAV_CMD_NAV_LAND:
             return math.radians(item.params[3])
         north, east = self._target[0] - here.position[0], self._target[1] - here.position[1]

@@ -1,4 +1,4 @@
-"""Mission protocol: upload and download of plans, one item at a time, with the old or the new messages."""
+"""Mission protocol: upload and download of plans, item by item, with coordinates as floats or integers."""
 
 from __future__ import annotations
 
@@ -234,7 +234,10 @@ class Transfer:
 
 
 def _integer(message: MissionItem | MissionItemFloat) -> Item | None:
-    """Return the item with coordinates in whole degE7; None if they do not fit."""
+    """Return the item with integer coordinates; None if they do not fit.
+
+    They are in degE7 in the frames of ``ABOVE_SEA`` and ``ABOVE_HOME``, and in 1e-4 m in all other frames.
+    """
     x, y = message.x, message.y
     if isinstance(message, MissionItemFloat):
         scale = 1e7 if message.frame in ABOVE_SEA | ABOVE_HOME else 1e4

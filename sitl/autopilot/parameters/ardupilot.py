@@ -34,7 +34,7 @@ STREAMS: Final = {
     "EXTRA2": mavlink.MAV_DATA_STREAM_EXTRA2,
     "EXTRA3": mavlink.MAV_DATA_STREAM_EXTRA3,
 }
-"""MAV_DATA_STREAM of the SR0_ parameters, which set the rates of its messages."""
+"""MAV_DATA_STREAM by the end of the name of the SR0_ parameter that sets the rate of its messages."""
 
 _DEGREE: Final = math.radians(1.0)
 _SWITCH: Final = ((0, "off"), (1, "on"))

@@ -59,7 +59,7 @@ class Parameter(NamedTuple):
         return float(_FLOAT.unpack(_FLOAT.pack(value))[0]) if self.kind is Kind.REAL32 else round(value)
 
     def refusal(self, value: float) -> str | None:
-        """Return the reason against ``value`` (a result of ``fitted``, or not finite), or None."""
+        """Return the reason against ``value`` (fitted, or too large for float32, or not finite), or None."""
         if not math.isfinite(value):
             return f"{self.name}: not a number"
         if not self._held(self.low) <= value <= self._held(self.high):

@@ -31,8 +31,8 @@ class ParameterProtocol:
     """Server that sends and sets ``values``.
 
     ``next_due`` (µs): no ``work`` is due before it. A refused value is answered with the old value and with
-    STATUSTEXT (253). ArduPilot omits the number in the answer to a request by name; PX4 includes it, and has
-    the hash.
+    STATUSTEXT (253). ArduPilot omits the parameter's number in the answers to PARAM_SET and to a request by
+    name; PX4 includes it, and also sends the hash.
     """
 
     def __init__(

@@ -42,7 +42,8 @@ ARDUPILOT: Final = Airframe(
     angle_acceleration=math.radians(1100.0),
     angle_lag=0.04,
     thrust_lag=0.08,
-    # Its 3 kg quadrotor: momentum drag of four rotors at hover thrust, 0.74 N per m/s, and 0.10 N per (m/s)².
+    # The 3 kg quadrotor of ArduPilot's SITL: momentum drag of four rotors at hover thrust, 0.74 N per m/s,
+    # and 0.10 N per (m/s)².
     drag=0.246,
     square_drag=0.0336,
     vertical_drag=False,

@@ -97,7 +97,7 @@ class ArduPilotResponse:
         gains, mass, shaping = self._gains, self._mass, self._shaping
         x, y, z = shaping.position
         error = x - mass.position[0], y - mass.position[1]
-        # The desired position never leads by more than corrections of the permitted speed can close.
+        # The position error is limited to the one for which the square-root law gives the greatest speed.
         near = cut(error, inverse_square_root_law(self._speeds.level, gains.position, gains.acceleration))
         if near != error:
             error = near
@@ -137,7 +137,11 @@ class ArduPilotResponse:
         self._velocity_error = new
 
     def _integrate(self, dt: float) -> None:
-        """Update the integral; while an error points to the lean limit, it cannot lengthen the integral."""
+        """Update the integral of the velocity error.
+
+        While the lean angle is limited, an error in the direction of the limited acceleration cannot lengthen
+        the integral.
+        """
         velocity_error, before = self._velocity_error or (0.0, 0.0), self._integral
         gain = self._gains.integral * dt
         integral = before[0] + gain * velocity_error[0], before[1] + gain * velocity_error[1]
@@ -146,7 +150,10 @@ class ArduPilotResponse:
         )
 
     def _limited_by_tilt(self, acceleration: Pair) -> Pair:
-        """Limit the acceleration to ANGLE_MAX; the part across the desired velocity has priority."""
+        """Limit the acceleration to that of a lean angle of ANGLE_MAX.
+
+        The part across the desired velocity has priority.
+        """
         limit = GRAVITY * math.tan(self._gains.tilt)
         self._limited = (0.0, 0.0)
         if math.hypot(*acceleration) <= limit:

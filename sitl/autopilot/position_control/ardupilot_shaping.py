@@ -2,9 +2,10 @@
 
 Each set-point is extrapolated with its own acceleration. The desired trajectory approaches it with a velocity
 that closes the position error by the square-root law, an acceleration that closes the velocity error, and the
-set-point's own velocity and acceleration on top. The corrections are limited to WPNAV_SPEED and WPNAV_ACCEL,
-the set-point's own part is not; but the *change* of the desired acceleration is limited by PSC_JERK_XY. So a
-stream with less jerk passes unchanged, and one that reverses its acceleration is followed late.
+set-point's own velocity and acceleration on top. The corrections are limited to WPNAV_SPEED and WPNAV_ACCEL
+(vertically WPNAV_SPEED_UP, WPNAV_SPEED_DN and WPNAV_ACCEL_Z), the set-point's own part is not; but the
+*change* of the desired acceleration is limited by PSC_JERK_XY (vertically PSC_JERK_Z). So a stream of
+set-points with less jerk passes unchanged, and a stream that reverses its acceleration is followed late.
 """
 
 from __future__ import annotations
@@ -27,9 +28,15 @@ from sitl.config.gains import ArduPilotGains, Speeds
 from sitl.values.setpoints import ZERO
 
 _OVERSPEED: Final = 2.0
-"""Gain with which vertical limits grow when the vertical speed limits are exceeded."""
+"""Factor of the vertical limits of acceleration and jerk while the vertical speed limit is exceeded.
+
+The limits are multiplied by this factor times the ratio of the desired vertical speed to its limit.
+"""
 _MAX_CROSS_SHARE: Final = math.sqrt(0.5)
-"""Share of the correction that may be across the wanted velocity, if most of it is along that velocity."""
+"""Greatest part of a correcting acceleration across the wanted velocity, over the limit of the correction.
+
+It applies to corrections that are mostly along the wanted velocity.
+"""
 _NONE: Final = (0.0, 0.0)
 
 
@@ -52,9 +59,11 @@ class Shaping:
     def advance(self, wanted: Motion, dt: float, limited: Pair, error: Pair, velocity_error: Pair) -> None:
         """Advance by ``dt`` seconds towards ``wanted``, which is valid at the end of the step.
 
-        ``limited``: direction in which the lean angle is at its limit, else zero. At the limit the desired
-        position does not move on, and the desired velocity does not grow, in that direction if the position
-        ``error`` (m) or velocity error ``velocity_error`` (m/s), respectively, points in the same direction.
+        ``limited`` (m/s²): acceleration that exceeds the lean limit, or zero if the limit is not reached.
+        ``error`` (m) and ``velocity_error`` (m/s): desired minus actual position and velocity. The desired
+        horizontal position does not move while its motion and ``error`` both have a component along
+        ``limited``. The desired horizontal velocity does not change while its change and ``velocity_error``
+        both have one, except to brake a velocity against ``limited``.
         """
         self._move(dt, limited, error, velocity_error)
         (x, y, z), (u, v, w), (a, b, c) = wanted

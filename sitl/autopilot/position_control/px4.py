@@ -93,7 +93,7 @@ class Px4Response:
         self._previous_velocity = self._mass.velocity
 
     def _integrate(self, velocity_error: Vector, excess: Pair, dt: float) -> None:
-        """Update the integrals; acceleration that the tilt limit cut off is subtracted from them."""
+        """Update the integrals; the ``excess`` over the tilt limit reduces those of north and east."""
         gains = self._gains
         back = 2.0 / gains.velocity
         x, y, z = self._integral
@@ -111,7 +111,7 @@ def _within(first: Pair, second: Pair, limit: float) -> Pair:
     size = math.hypot(*first)
     if size >= limit:
         return cut(first, limit)
-    # |first + s·second| = most, 0 ≤ s < 1.
+    # |first + s·second| = limit, 0 ≤ s < 1.
     square = second[0] ** 2 + second[1] ** 2
     half = first[0] * second[0] + first[1] * second[1]
     s = (math.sqrt(half * half + square * (limit * limit - size * size)) - half) / square

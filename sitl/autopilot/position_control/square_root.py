@@ -30,7 +30,7 @@ def inverse_square_root_law(rate: float, gain: float, limit: float) -> float:
 
 
 def directed(error: Pair, gain: float, limit: float, dt: float = 0.0) -> Pair:
-    """Return the square-root law along a horizontal ``error``."""
+    """Return the rate that closes a horizontal ``error`` by the square-root law, along that error."""
     size = math.hypot(*error)
     if size < 1e-12:
         return 0.0, 0.0

@@ -72,7 +72,7 @@ def plan_step(rounds: int) -> Array:
 
 
 def _scene(config: CompanionConfig, seed: int, epoch: int) -> Scene:
-    """Return a scene: eight neighbours around, 1.5 to 3 m away at nearly the same height, moving together."""
+    """Return a scene: eight neighbours around, 1.5 to 3 m away at the same height, with similar velocity."""
     random = np.random.default_rng(seed)
     fleet = FleetFrame(47.397742, 8.545594, 488.0)
     flight = CertifiedFlight(config, Source(1, COMPONENT), fleet)

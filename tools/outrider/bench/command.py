@@ -48,7 +48,7 @@ _STEPS_A_CALL = 8
 
 
 class Scene(NamedTuple):
-    """One instant of a companion with eight neighbours, all within the reach of the field, ready to plan."""
+    """One instant of a companion with eight neighbours near or within d_safe, ready to plan."""
 
     world: World
     position: np.ndarray
@@ -180,7 +180,7 @@ def real_time_factor(replan_hz: float | None) -> float:
 def _scene(config: CompanionConfig, seed: int) -> Scene:
     """Return a scene as in a swap: eight neighbours around, the goal behind them.
 
-    The neighbours are 1.5 to 3 m away at nearly the same height, each with a shared horizon.
+    The neighbours are 1.5 to 3 m away at the same height, each with a shared horizon.
     """
     random = np.random.default_rng(seed)
     fleet = FleetFrame(47.397742, 8.545594, 488.0)
@@ -209,7 +209,7 @@ def _scene(config: CompanionConfig, seed: int) -> Scene:
 
 
 def _all_act(obstacles: Obstacles) -> None:
-    """Raise RuntimeError unless all eight neighbours are present, at most 0.5 m beyond the field's reach."""
+    """Raise RuntimeError unless all eight neighbours are present and less than d_safe + 0.5 m away."""
     distance = np.linalg.norm(obstacles.positions[:, 0] - (0.0, 0.0, 5.0), axis=1)
     if len(distance) != _NEIGHBOURS or distance.max() >= obstacles.d_safe.max() + 0.5:
         raise RuntimeError("the benchmark's scene lacks a neighbour within the reach of the field")

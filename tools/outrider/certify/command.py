@@ -34,7 +34,7 @@ def certify(directory: Path, as_json: bool = False) -> int:
 
 
 def show(name: str, verdict: Verdict) -> None:
-    """Print the verdict as a table, then one line for each finding and each anchor."""
+    """Print the verdict as a table, then up to 20 findings and up to 20 anchors, one per line."""
     pairs, nearest = verdict.pairs, verdict.pairs.nearest
     anchors = verdict.steps(Kind.ANCHOR)
     word = "certified" if verdict.certified else "not certified"

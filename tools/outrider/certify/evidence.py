@@ -10,10 +10,11 @@ from mavlink_bridge.wire.plan import Integers, WirePlan
 class Terms(NamedTuple):
     """Terms that the vehicles agreed on before the flight.
 
-    ``fleet``: system ids that share committed plans; ``apart``: those whose plans are not committed plans.
-    ``dt`` and ``epoch`` in µs; ``steps``: knots of a plan; ``origin``: fingerprint of its frame;
-    ``required``: least distance (m) between two plans; ``a_max``: mm/s² on each axis; ``upright``: distances
-    are horizontal.
+    ``fleet``: system ids that share committed plans, which are judged; ``apart``: system ids of moving
+    obstacles, whose plans are not judged. ``dt``: time between knots (µs); ``epoch``: time between plans
+    (µs); ``steps``: number of knots of a plan; ``origin``: fingerprint of its frame; ``required``: least
+    distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²); ``upright``: whether
+    only horizontal distances count.
     """
 
     fleet: tuple[int, ...]
@@ -41,7 +42,10 @@ class LoggedPlan(NamedTuple):
 
 
 class UnreadablePayloads(NamedTuple):
-    """Payloads of the type of plans or rosters that cannot be read; the first one at ``time`` (µs)."""
+    """Payloads of the type of plans or rosters that cannot be read.
+
+    ``time``: of the first one (µs); ``copies``: their number.
+    """
 
     owner: int
     sender: int

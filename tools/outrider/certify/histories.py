@@ -47,14 +47,14 @@ class Absence(NamedTuple):
 
 
 class History(NamedTuple):
-    """Plans of one vehicle in the order of their epochs, and the times at which it had left."""
+    """Plans of one vehicle in the order of their epochs, and its absences."""
 
     system: int
     steps: tuple[Step, ...]
     leaves: tuple[Absence, ...]
 
     def left(self, epoch: int) -> bool:
-        """Return whether the vehicle had said farewell before ``epoch`` (µs) began.
+        """Return whether the vehicle had said farewell before ``epoch`` (µs) began and was not yet back.
 
         It may then be landing, and its last plan is no longer flown.
         """
@@ -139,7 +139,7 @@ def _flaw(plan: WirePlan, terms: Terms, seen: Sequence[int]) -> tuple[str, str] 
 
 
 def _leaves(own: Log, plans: Sequence[WirePlan]) -> Iterable[Absence]:
-    """Yield each farewell, with the first of ``plans`` that was sent after the farewell was withdrawn."""
+    """Yield each farewell, and the epoch of the first of ``plans`` that was sent after its withdrawal."""
     sent = {sighting.plan: sighting.time for sighting in own.sightings if sighting.sender == own.owner}
     for word, following in zip_longest(own.words, own.words[1:]):
         if word.farewell:

@@ -32,9 +32,10 @@ Watch = Callable[[str, float], None]
 
 
 def read(directory: Path, watch: Watch) -> Evidence:
-    """Read all evidence in ``directory``; ``watch`` receives the log's name and the share that is done.
+    """Read all evidence in ``directory``.
 
-    Raises InputError where there is none.
+    ``watch`` receives the name of the log and the share (0…1) of all logs' bytes that was read. Raises
+    InputError for a directory without evidence.
     """
     path = directory / CONFIGURATION
     scenario = resolved(directory, _ALLOWED).scenario
@@ -82,7 +83,7 @@ def terms_of(scenario: Scenario) -> Terms:
 
 
 class _Tally:
-    """Contents of one log so far; a repeated payload is counted and decoded once."""
+    """Contents of one log so far; copies of a plan are counted, and the plan is decoded once."""
 
     def __init__(self, owner: int) -> None:
         self._owner = owner

@@ -24,7 +24,7 @@ class Verdict(NamedTuple):
 
     @property
     def certified(self) -> bool:
-        """Whether every pair was certified at every epoch, as far as the logs show."""
+        """Whether there is no finding; pairs that were not checked give none."""
         return not self.findings
 
     def seconds(self, time: int) -> float:
@@ -88,7 +88,7 @@ def judge(evidence: Evidence) -> Verdict:
 
 
 def _strange(terms: Terms, logs: tuple[Log, ...]) -> list[Finding]:
-    """Return findings for payloads that are no plan, and for plans of unknown vehicles."""
+    """Return findings for unreadable plans and rosters, and for plans of unknown vehicles."""
     known = terms.apart.union(terms.fleet)
     findings = [
         Finding("what is no plan was sent as one", (one.sender, one.owner), one.time, f"{one.copies} times")

@@ -1,4 +1,4 @@
-"""Commands that fly (swarm, sitl, fly) or check an endpoint for it (doctor)."""
+"""Commands that fly (swarm, sitl, fly) or check an endpoint before a flight (doctor)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands that show, check or convert recorded flights."""
+"""Commands that show, check or convert recorded flights; ``view`` also shows live ones."""
 
 from __future__ import annotations
 

@@ -4,5 +4,5 @@ The steps are frames → ``hearing`` (senders, messages, rates, last reception) 
 ``page``, or JSON.
 
 The examination is pure: times and frames go in, findings come out. On a live link ``consultation`` also sends
-a few requests that change nothing; a log is read at once.
+a few requests that change nothing; a log is read to its end without waiting.
 """

@@ -13,12 +13,12 @@ _MAX_SPEED_UP: Final = 100
 
 
 class BootClock:
-    """Comparison of two clocks, fed with pairs of times.
+    """Comparison of a vehicle's clock with the receiver's, fed with pairs of times.
 
-    ``restarts``: number of times the clock went back by more than a second. ``backward``: number of times,
-    among ``stamps``, that it went back at all, or that two different messages had the same time. ``leaps``:
-    number of times it went ahead by more than 5 s plus 100 times the time that passed. Each message is
-    compared with the previous one of its type.
+    ``stamps``: number of time stamps. ``restarts``: number of times the vehicle's clock went back by more
+    than a second. ``backward``: number of stamps at which it went back at all, or at which two different
+    messages had the same time. ``leaps``: number of times it went ahead by more than 5 s plus 100 times the
+    time that passed for the receiver. Each message is compared with the previous one of its type.
     """
 
     def __init__(self) -> None:
@@ -65,5 +65,5 @@ class BootClock:
 
     @property
     def doubled(self) -> bool:
-        """Whether the stamps come from two clocks: ``backward`` is at least five, and 2 % of ``stamps``."""
+        """Whether the stamps come from two clocks: ``backward`` is ≥ 5 and ≥ 2 % of ``stamps``."""
         return self.backward >= 5 and self.backward >= 0.02 * self.stamps

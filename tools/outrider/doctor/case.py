@@ -47,14 +47,14 @@ class Case(NamedTuple):
 
     @property
     def silent(self) -> float:
-        """Time from the vehicle's last message to the end (s)."""
+        """Time from the vehicle's last message to the end of what was recorded on the link (s)."""
         return (self.hearing.end - self.vehicle.last) * 1e-6
 
     def silent_for(self, message_id: int) -> float:
-        """Return the time (s) from the last message of that id to the end.
+        """Return the time (s) from the vehicle's last message of that id to the end.
 
-        In a log, the end is the time of the vehicle's last message. Without a message of that id, return the
-        whole duration.
+        In a log, the end is the time of the vehicle's last message; on a live link, it is the present.
+        Without a message of that id, return the whole duration.
         """
         stream = self.vehicle.streams.get(message_id)
         end = self.vehicle.last if self.log else self.hearing.end

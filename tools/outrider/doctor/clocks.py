@@ -10,13 +10,16 @@ from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 
 _RATE_TOLERANCE, _JITTER_S = 0.005, 0.1
-"""Tolerance of the rate: a ratio, and the jitter of the messages' delay (s), divided by the duration."""
+"""The tolerance of the rate is the first value, a ratio, plus the second divided by the duration (s).
+
+The second value (s) allows for jitter of the messages' delay.
+"""
 _MAX_SLIGHT_DEVIATION: Final = 0.2
-"""Deviation of the rate from 1 at which it counts as a simulation not in real time."""
+"""Deviation of the rate from 1 from which on the vehicle counts as a simulation not in real time."""
 
 
 def clock(case: Case) -> Iterator[Finding]:
-    """Yield findings on the rate and the steps of time_boot."""
+    """Yield findings on the rate and the steps of time_boot, and on the date."""
     ticking = case.vehicle.clock
     if ticking.restarts and not ticking.doubled:
         yield Finding(

@@ -58,7 +58,7 @@ class Consultation:
         return passed >= self._limit or (passed >= _MIN_DURATION_US and self._questions.done(now))
 
     def share(self, now: int) -> float:
-        """Return the share of the longest duration that has passed, 0…1."""
+        """Return the share (0…1) of the longest possible duration that has passed by ``now`` (µs)."""
         if self._start is None:
             return 0.0
         passed = now - self._start

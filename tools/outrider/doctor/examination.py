@@ -37,8 +37,8 @@ _WORST_FIRST: Final = (Severity.BLOCKING, Severity.WARNING, Severity.NOTE, Sever
 class Examination:
     """Examination of the autopilot ``system``.
 
-    None selects the lowest id, in a log the vehicle with the most messages. ``log``: it is a recording;
-    ``me``: sender id of the doctor.
+    None selects the lowest id, in a log the vehicle with the most messages; ``Hearing.vehicle`` has the
+    exceptions. ``log``: the frames are those of a log; ``me``: sender id of the doctor.
     """
 
     def __init__(self, system: int | None = None, *, log: bool = False, me: Source | None = None) -> None:

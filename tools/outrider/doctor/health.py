@@ -71,7 +71,11 @@ def _failing(case: Case) -> Finding:
 
 
 def battery(case: Case) -> Iterator[Finding]:
-    """Yield a finding from SYS_STATUS and BATTERY_STATUS, by the autopilot's own thresholds."""
+    """Yield a finding from SYS_STATUS and BATTERY_STATUS.
+
+    A voltage below BATT_LOW_VOLT blocks an escort, and so does a charge up to the greater of BAT_LOW_THR and
+    15 %. A charge up to 30 % is a warning.
+    """
     status, reported = case.vehicle.latest(SysStatus), case.vehicle.latest(BatteryStatus)
     remaining = reported.remaining if reported is not None else None
     voltage = status.battery_voltage if status is not None else None

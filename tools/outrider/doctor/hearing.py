@@ -26,8 +26,8 @@ class Hearing:
 
     ``begin`` and ``end`` span all that was received or waited for (µs). ``octets``: bytes of frames. ``bad``,
     ``skipped_bytes``: frames with a wrong checksum, and bytes that belong to no frame. ``unreceived``: frames
-    of senders beyond the recorded number. ``refused``: frames that failed the signature check;
-    ``refusal``: why the last one did.
+    of senders beyond the first ``MOST``. ``refused``: frames that failed the signature check; ``refusal``:
+    why the last of these failed.
     """
 
     def __init__(self) -> None:

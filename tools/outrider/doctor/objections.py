@@ -16,7 +16,7 @@ from outrider.doctor.sender_record import SenderRecord
 _WAIT_ARDUPILOT_US: Final = 35_000_000
 """µs; ArduPilot sends its texts every 30 s even without a request."""
 _WAIT_PX4_US: Final = 6_000_000
-"""µs; PX4 reports on request and does not repeat it."""
+"""µs; PX4 reports its reasons on request and does not repeat them."""
 _SETTLING_US: Final = 2_000_000
 """Time to wait after a reason (µs): others follow at once."""
 _REPEAT_INTERVAL_US: Final = 5_000_000

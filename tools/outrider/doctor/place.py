@@ -13,7 +13,7 @@ from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity
 
 _MAX_DISTANCE_M: Final = 3.0
-"""Largest horizontal distance between the two reports of a vehicle at rest (m)."""
+"""Largest horizontal distance between local and global position of a vehicle at rest (m)."""
 _MAX_HOME_DISTANCE_M: Final = 500.0
 _MAX_REVERSED_SLOPE: Final = -0.5
 

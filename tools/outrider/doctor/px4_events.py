@@ -121,7 +121,7 @@ _STATES: Final = {
 
 
 def event_id(name: str) -> int:
-    """Return the id of an event of the autopilot (component 1), without that component."""
+    """Return the low 24 bits of the id of an event; the high 8 bits are the component."""
     value = _OFFSET
     for byte in name.encode():
         value = ((value ^ byte) * _PRIME) & 0xFFFFFFFF
@@ -142,7 +142,8 @@ def genuine(frame: Frame) -> bool:
 def reason(frame: Frame, custom_mode: int) -> str | None:
     """Return the reason in an EVENT against arming in mode ``custom_mode``.
 
-    None for other frames, unknown or less severe events, and events that do not concern this mode.
+    None for other frames, unknown events, events less severe than a warning, and events that do not concern
+    this mode.
     """
     if not genuine(frame):
         return None

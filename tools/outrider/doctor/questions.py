@@ -27,7 +27,7 @@ received, is lost. It is not 195, the id of ``fly``: others would take the docto
 STRANGER: Final = Source(245, COMPONENT)
 """Sender id before the vehicle's system id is known.
 
-A serial link, for example, may wait for a first message.
+The doctor sends its HEARTBEAT even then, because an autopilot may send nothing before it receives a message.
 """
 _HEARTBEAT_INTERVAL_US: Final = 1_000_000
 _REPEAT_INTERVAL_US: Final = 700_000
@@ -99,7 +99,10 @@ class Questions:
         return said
 
     def done(self, now: int) -> bool:
-        """Return whether every request was answered or sent three times; False for the first 2 s."""
+        """Return whether every request was answered, or sent three times and then given 0.7 s for an answer.
+
+        False until 2 s have passed since the vehicle was first received.
+        """
         vehicle = self._examination.vehicle
         if vehicle is None or self._met_at is None or now - self._met_at < _STREAM_WAIT_US:
             return False

@@ -24,8 +24,9 @@ from outrider.terminal.share_progress import share_progress
 class Result(NamedTuple):
     """Result of an export: the files written, and the data left out.
 
-    ``out_of_order``: messages that would go back in time; ``damaged_records`` of logs; ``unknown_messages``:
-    messages that the dialect does not define; ``unread_logs``: a line for each file that is no readable log.
+    ``out_of_order``: messages that would go back in time; ``damaged_records``: records that cannot be read;
+    ``unknown_messages``: messages that the dialect does not define; ``unread_logs``: a line for each file
+    that is no readable log.
     """
 
     format: str

@@ -1,6 +1,6 @@
 """Tables of a flight: true motion, separation and plans.
 
-Units are SI and radians, coordinates fleet-local ENU. Missing values are NaN.
+The names of columns have the units. Coordinates are fleet-local ENU. Missing values are NaN.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from outrider.runs.arrays import Motion, Plans, Whole
 from outrider.runs.source import Run
 
 _ROWS: Final = 65_536
-"""Rows of one part; a part may have a few more."""
+"""Maximum number of rows of one part of ``vehicles`` and ``moving``; each other table is one part."""
 _AXES = ("east", "north", "up")
 
 

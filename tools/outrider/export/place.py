@@ -1,4 +1,4 @@
-"""Destination of an export: beside the source or at ``--out``, written completely or not at all."""
+"""Destination of an export: in or beside the source, or at ``--out``; written completely or not at all."""
 
 from __future__ import annotations
 

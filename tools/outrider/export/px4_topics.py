@@ -1,7 +1,8 @@
 """Conversion of an autopilot's MAVLink messages to PX4's topics, where the meaning is the same.
 
 Names, units and frames (NED, body FRD) are those of PX4's messages. A field that MAVLink does not provide is
-omitted from the format instead of being invented; a value that MAVLink marks as unknown is NaN.
+omitted from the format instead of being invented; a value that MAVLink marks as unknown is NaN. The only
+exceptions are the ``valid`` flags of local and global position, which are always true.
 """
 
 from __future__ import annotations

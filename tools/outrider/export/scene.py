@@ -1,7 +1,7 @@
 """3-D scene of a flight for Foxglove's 3-D panel: moving frames, and bodies fixed to them.
 
 Bodies are written once, each fixed to a frame: ``fleet`` (ENU), ``vehicle-N``, ``target``, ``moving-N``. A
-viewer that jumps to any time therefore shows all bodies, and only the frames need space.
+viewer that jumps to any time therefore shows all bodies, and only frames and trails are written repeatedly.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def _span(scenario: Scenario) -> float:
 def _vehicle(now: int, system: int, span: float, d_min: float, color: Color) -> Json:
     """Return a disc with an arrow along its nose, inside a shell of diameter d_min.
 
-    Two shells that touch are d_min apart.
+    The centres of two vehicles whose shells touch are d_min apart.
     """
     return foxglove.entity(
         now,

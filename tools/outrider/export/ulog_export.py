@@ -1,7 +1,8 @@
 """Export of logs as ULogs, one for each vehicle.
 
-Every message is a topic ``mavlink_name`` with its raw payload, and an instance for each sender and link. The
-messages of the vehicle's own autopilot, and the set-points sent to it, are also converted to PX4's topics.
+Every message type is a topic ``mavlink_name``, with an instance for each sender and link; the data is the
+raw payload. The messages of the vehicle's own autopilot, and the set-points sent to it, are also converted to
+PX4's topics.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from outrider.runs.source import Run
 
 SECOND: Final = 1_000_000
 _SURVEYED = 0.3
-"""Share of the work that is done after the first pass, which finds the senders."""
+"""Progress (0…1) at the end of the first pass, which finds first times, message types and vehicles."""
 _HEAD = (("uint8_t", "link"), ("uint8_t", "system"), ("uint8_t", "component"))
 
 
@@ -117,8 +118,8 @@ def _file(folder: Path, system: int, zero: int, kinds: list[Kind]) -> UlogFile:
 class _VehicleConverter:
     """Converter of messages to the file of one vehicle.
 
-    ``by_link`` sets whether links are distinguished: in a log outside a run the low bits of the time stamps
-    may not be link numbers.
+    ``by_link`` sets whether topics have separate instances for each link: in a log outside a run the low bits
+    of the time stamps may not be link numbers.
     """
 
     def __init__(self, file: UlogFile, system: int, zero: int, by_link: bool) -> None:

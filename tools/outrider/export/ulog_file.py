@@ -16,7 +16,7 @@ from typing import Final, NamedTuple, Self
 from outrider.errors import OutriderError
 
 MAGIC: Final = b"ULog\x01\x12\x35\x01"
-"""Header; its last byte is the version."""
+"""First eight bytes of the header; the last of them is the version of the format."""
 MOST_INSTANCES: Final = 256
 _HEADER = Struct("<HB")
 _FLAGS = bytes(40)
@@ -77,8 +77,8 @@ class UlogFile:
     def data(self, time: int, topic: Topic, source: object, values: bytes) -> None:
         """Write a message of ``topic``; each ``source`` has an instance of its own.
 
-        A message earlier than the one before it is omitted and counted, because a series must not go back in
-        time. Raises OutriderError for the 257th source of a topic.
+        A message earlier than the last written one of its topic and source is omitted and counted, because a
+        series must not go back in time. Raises OutriderError for the 257th source of a topic.
         """
         key = topic.name, source
         number = self._subscriptions.get(key)

@@ -39,7 +39,7 @@ _SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 
 
 def run(asked: Request) -> int:
-    """Fly until the vehicle has landed, a signal ends the program or the time limit ends.
+    """Fly until the vehicle has landed, a signal ends the program or the time limit has passed.
 
     Returns the exit status, ``FAULT`` after a fault. The signals are SIGINT, SIGTERM, SIGHUP and SIGQUIT; the
     operator's ``quit`` ends the flight too. If the request names a log, make a shadow run of it instead.

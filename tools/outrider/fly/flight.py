@@ -1,10 +1,11 @@
 """Supervision of one flight by the parent process.
 
-The parent identifies the autopilot, starts the child that flies, forwards orders to it, and asks the
-autopilot to hold when the child ends, for whatever reason.
+The parent identifies the autopilot, starts the child that flies, and forwards orders to it. When a child that
+controlled the vehicle ends, for whatever reason, the parent asks the autopilot to hold.
 
-If the child ends unasked, another child follows. It does not fly without a new go, but shares the position of
-the holding vehicle with the other companions.
+If the child ends unasked, another child follows, unless ``MOST`` children were lost within ``WITHIN``
+seconds. The new child does not fly without a new go, but shares the position of the holding vehicle with the
+other companions.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from outrider.fly.worker import Worker
 from outrider.interruption import ReceivedSignal, insisted
 
 LOOK: Final = 0.05
-"""Time between two polls (s)."""
+"""Longest time between two polls (s)."""
 MOST: Final = 5
 WITHIN: Final = 60.0
 """``MOST`` processes lost within ``WITHIN`` seconds end the flight."""
@@ -55,9 +56,9 @@ _STOP_POLL_S: Final = 0.01
 class Flight:
     """Supervisor of one flight.
 
-    ``look`` is called about 20 times a second; ``state`` is the latest one. ``stops``: the signals received
-    so far. The first ends the flight; after another one, at least a second later, the child is killed at
-    once.
+    ``look`` is called about 20 times a second. ``state``: the latest state that the child reported.
+    ``stops``: the signals received so far. The first ends the flight; after another one, at least a second
+    after the first, the child is killed at once.
     """
 
     def __init__(
@@ -113,8 +114,8 @@ class Flight:
                 self._look_after(desk, child)
             finally:
                 self._finish(desk, child)
-                # Not earlier: when no process has this end open, the parent's next send fails and the kernel
-                # discards the messages that wait at the parent's end.
+                # The child's end of the channel is closed only now: when no process has it open, the parent's
+                # next send fails and the kernel discards the messages that wait at the parent's end.
                 orders.release()
             if self._over():
                 self.fault = self.fault or self._failed or self._elsewhere

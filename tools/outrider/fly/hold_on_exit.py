@@ -1,4 +1,4 @@
-"""Hold request at exit, repeated until the autopilot holds, is controlled by another, or time is up."""
+"""Hold request at exit, repeated for 3 s or until the autopilot holds, disarms or has another controller."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mavlink_bridge.node import Datagram
 
 _STEP_US: Final = 10_000
 _MIN_DURATION_US: Final = 300_000
-"""Minimum duration of the request even in a hurry (µs)."""
+"""Minimum duration (µs) of a request that is not over, even if ``hurry()`` is true."""
 
 
 def farewell(word: HoldOnExit, link: Link, clock: Clock, hurry: Callable[[], bool]) -> None:

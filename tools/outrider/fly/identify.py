@@ -15,7 +15,7 @@ from outrider.errors import InputError
 
 _HEARTBEAT_PERIOD_US = 1_000_000
 _OTHERS_ONLY_TIMEOUT_US = 60_000_000
-"""Time limit for the own heartbeat after another vehicle's first one (µs): the own one may boot last."""
+"""Time limit (µs) for the own vehicle's heartbeat after another's first: the own vehicle may boot last."""
 
 
 class Identification:

@@ -1,4 +1,4 @@
-"""Instance lock: one companion per vehicle on one computer; a second one at the same endpoint is refused.
+"""Instance lock: one companion for each vehicle and autopilot endpoint on one computer; a second is refused.
 
 The lock is a file in a folder of the user. Its name depends on the network namespace, because the same port
 in another namespace is another endpoint; a serial port is the same in all namespaces.
@@ -59,8 +59,9 @@ def instance_lock(system: int, endpoint: Endpoint) -> Iterator[None]:
 
 
 def _folder() -> Path:
-    """Return the lock folder, below XDG_RUNTIME_DIR or else below the temporary directory.
+    """Return the lock folder.
 
+    It is below XDG_RUNTIME_DIR if only this user may enter that; if not, below the temporary directory.
     Raises OSError if another user owns the folder or may enter it.
     """
     given = os.environ.get("XDG_RUNTIME_DIR", "")

@@ -5,16 +5,19 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 _MAX_LANDING_ERROR_M: Final = 1.5
-"""Largest horizontal distance from its place that counts as landed there (m).
+"""Largest horizontal distance (m) from the return position that counts as landed there.
 
 Estimation errors and drift at touch-down reach this.
 """
 _MAX_DISPLACEMENT_M: Final = 6.0
-"""Largest distance from its place that is no fault (m): a vehicle lands beside an occupied place."""
+"""Largest horizontal distance (m) from the return position that is no fault.
+
+A vehicle lands beside its return position if that is occupied.
+"""
 
 
 class Verdict(NamedTuple):
-    """Text for a landing; ``fault``: the vehicle is not where it should be, or its position is unknown."""
+    """Text for a landing; ``fault``: a returning vehicle is too far off, or its position is unknown."""
 
     text: str
     fault: bool
@@ -23,8 +26,8 @@ class Verdict(NamedTuple):
 def verdict(off: float | None, *, returning: bool) -> Verdict:
     """Return the verdict for a landed vehicle.
 
-    ``off``: horizontal distance (m) from the return position, None if unknown. ``returning``: whether the
-    vehicle was on its way back; otherwise any position is right.
+    ``off``: upper bound (m) of the horizontal distance from the return position, None if unknown.
+    ``returning``: whether the vehicle was on its way back; if not, any position is right.
     """
     if not returning:
         return Verdict("landed", False)

@@ -61,7 +61,7 @@ _USB: Final = "ttyACM"
 
 
 def said(config: CompanionConfig, signed: bool) -> float:
-    """Return the maximum bytes per second that one companion sends on the swarm link.
+    """Return the maximum bytes per second of one companion's states, plans and heartbeats on the swarm link.
 
     MAVLink 2 truncates zeros at the end of a message, so a vehicle at rest sends less.
     """
@@ -86,9 +86,10 @@ def carried(baud: int, config: CompanionConfig, signed: bool) -> int:
 
 
 def doubts(endpoint: Endpoint, config: CompanionConfig, signed: bool) -> str:
-    """Return a warning about ``endpoint`` as swarm link of a fleet of eight; empty if it has room.
+    """Return a warning about ``endpoint`` as swarm link of a fleet of eight; empty if there is none.
 
-    Raises InputError if there is no room for two vehicles.
+    There is none for a line with room, or for an endpoint that is no serial line. Raises InputError if there
+    is no room for two vehicles.
     """
     if not isinstance(endpoint, Serial):
         return ""
@@ -119,9 +120,10 @@ def reported(signed: bool) -> float:
 
 
 def doubts_of_autopilot(endpoint: Endpoint, config: CompanionConfig, signed: bool, *, dry_run: bool) -> str:
-    """Return a warning about ``endpoint`` as autopilot link; empty if it is no serial radio or has room.
+    """Return a warning about ``endpoint`` as autopilot link; empty if there is none.
 
-    A dry run requires room for twice the autopilot's traffic: a ground station uses as much.
+    There is none for a line with room, a USB device, or an endpoint that is no serial line. A dry run
+    requires room for twice the autopilot's traffic: a ground station uses as much.
     """
     if not isinstance(endpoint, Serial) or _USB in endpoint.device:
         return ""

@@ -45,7 +45,8 @@ class _Entry(NamedTuple):
 class Log:
     """Log of vehicle ``system`` in ``directory``: an observer of the loop, and a context manager.
 
-    No call blocks. ``report`` is called once, with the reason, if logging has to stop.
+    Only the exit from the context blocks, for at most ``timeout_s`` (s). ``report`` is called once, with the
+    reason, if logging has to stop.
     """
 
     def __init__(

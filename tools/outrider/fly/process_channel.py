@@ -98,7 +98,7 @@ class OrderLink:
     def alone(self) -> bool:
         """Whether nothing came from the parent for ``PARENT_TIMEOUT_S`` s.
 
-        Before its first message the time counts from the first call.
+        Before the parent's first message, the time counts from the first reading of this property.
         """
         if self._contact is None:
             self._contact = self._clock()

@@ -75,7 +75,8 @@ def checked(options: Options) -> Request:
         raise InputError("--go: does not go with --dry-run, in which nothing takes off")
     autopilot = _endpoint("autopilot", options.autopilot)
     if isinstance(autopilot, Replay):
-        # Nothing flies; the shadow run reports which vehicles the log contains.
+        # Nothing flies, so 1 is assumed without a system id. If the log lacks vehicle 1, the shadow run lists
+        # the vehicles of the log.
         config = config if config.system else config.model_copy(update={"system": 1})
         return _of_log(options, config, Path(autopilot.path))
     if not config.system:

@@ -109,6 +109,6 @@ def setpoint_check(
 
 _ROUNDING = 1e-3
 _YAW_STEP_TOLERANCE_RAD = 0.02
-"""Tolerance of yaw steps (rad): the clock may run 1 % faster or slower than the log's."""
+"""Tolerance of yaw steps (rad): a shadow run's clock may run 1 % faster or slower than the log's clock."""
 _POSITION_STEP_TOLERANCE_M = 0.15
 """Tolerance of position steps (m): correction of the own position estimate between two set-points."""

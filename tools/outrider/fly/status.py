@@ -29,7 +29,7 @@ _REPEAT_AFTER_S = 10.0
 _REPEATED = ("autopilot", "refused")
 _WAITING = (Phase.CONNECT, Phase.PREPARE)
 _QUARTZ_RATE_TOLERANCE = 0.005
-"""Rate error from which on a clock is not a quartz clock."""
+"""Error |rate − 1| from which on a clock is not a quartz clock."""
 
 
 class State(NamedTuple):

@@ -1,7 +1,7 @@
 """Comparison of a shadow run's set-points with the recorded flight.
 
-Set-points begin at the vehicle's position. So they must be near it, in the same frame, and their velocities
-must agree with their positions.
+A shadow companion plans from the vehicle's recorded position. So its set-points must be near that position
+and in the same frame. The set-points' velocities must also agree with their positions.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class TrajectoryComparison(NamedTuple):
     """Result of the comparison; None where there is nothing to measure.
 
     ``beside``: distance (m) of set-points from the vehicle's newest position, less the motion at the
-    set-point's speed since then, 99th percentile. ``astray``: deviation (m) of the set-points' velocities,
-    integrated over one second, from their change of position, 95th percentile.
+    set-point's speed during the position's age plus 0.05 s, 99th percentile. ``astray``: deviation (m) of the
+    set-points' velocities, integrated over one second, from their change of position, 95th percentile.
     """
 
     beside: float | None

@@ -31,7 +31,10 @@ _SWARMS = frozenset(
         mavlink.MAVLINK_MSG_ID_TUNNEL,
     )
 )
-"""Messages between companions: on the swarm link only from senders that ``swarm`` admits."""
+"""Messages between companions.
+
+The swarm link takes them only from vehicles other than the own one and the target, by system id.
+"""
 
 
 class Wiring(NamedTuple):

@@ -25,7 +25,7 @@ def fly(task: Task) -> dict[str, Any]:
 def _scene(outcome: Outcome) -> dict[str, Any]:
     """Return the data of the picture, rounded to cm because it goes into a journal.
 
-    Times (T,) since the start of the clock (s); horizontal positions (T, K, 2) and the target's path (≤ T,
+    Times (T,) since the goal event (s); horizontal positions (T, K, 2) and the target's path (≤ T,
     2), without the times at which it is absent (m); the least separation (T,), m, or −1 where there is none;
     obstacles as (east, north, radius); paths of moving obstacles (M, T, 2) and their radii; the number of
     vehicles without bystanders; d_min (m).

@@ -41,7 +41,7 @@ def showings(names: tuple[str, ...]) -> tuple[GalleryPanel, ...]:
 
 
 def cells_of(shown: tuple[GalleryPanel, ...]) -> list[Cell]:
-    """Return the cell of each panel: the scenario as shipped, started in the air."""
+    """Return the cell of each panel: the shipped scenario with the panel's ``way``, started in the air."""
     found = []
     for number, (scenario, way) in enumerate(shown, 1):
         other = {"companion.avoidance": "certified"} if way == "certified" else {"companion.methods": [way]}

@@ -21,7 +21,7 @@ ROTORCRAFT: Final = frozenset(
         mavlink.MAV_TYPE_GENERIC_MULTIROTOR,
     )
 )
-"""Values of MAV_TYPE that can hover; as ArduPilot they are ArduCopter."""
+"""Values of MAV_TYPE of rotorcraft; with ArduPilot, vehicles of these types run ArduCopter."""
 _PREFIX: Final = "COPTER_MODE_"
 _COPTER: Final[dict[int, str]] = {
     number: entry.name.removeprefix(_PREFIX)

@@ -92,7 +92,8 @@ def watched(
 ) -> list[Iterator[LogMessage]]:
     """Return the messages of each log, with progress reports.
 
-    ``watch`` is called with the share of all logs that has been read, scaled to the range ``share``.
+    ``watch`` is called with the name of the log that is being read, and with the share of all logs that has
+    been read, scaled to the range ``share``.
     """
     total = max(sum(log.size for log in logs), 1)
     low, high = share

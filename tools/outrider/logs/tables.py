@@ -13,7 +13,7 @@ from outrider.logs.census import Census, Vehicle
 from outrider.logs.words import MILLION, kind, rates
 
 MOST_SHOWN, MOST_BESIDE = 30, 12
-"""Rows and systems in the table of rates; JSON has all."""
+"""Maximum numbers of rows and of systems in the table of rates; JSON has all."""
 
 
 def show(name: str, census: Census) -> None:

@@ -18,7 +18,10 @@ from outrider.logs.census import Census, Gaps, Vehicle
 SHORTEST_GAP = 1 << 21
 """µs, 2.1 s: a shorter silence is never a gap, because components send a HEARTBEAT every second."""
 UNUSUAL = 8
-"""A silence of more than this many mean intervals, rounded up to a power of two (µs), is a gap."""
+"""A silence of more than this many mean intervals, rounded up to a power of two (µs), may be a gap.
+
+It is one if it is also longer than ``SHORTEST_GAP``.
+"""
 _RECORDS_PER_REPORT = 1 << 12
 """Number of records between two reports of progress."""
 
@@ -42,7 +45,7 @@ def count(path: Path, progress: Callable[[float], None]) -> Census | None:
 
 
 class _Stream:
-    """One message of one component in one version of MAVLink."""
+    """Messages of one type from one component in one version of MAVLink."""
 
     __slots__ = ("count", "frame", "sender")
 
@@ -81,7 +84,8 @@ class _System:
 class _Tally:
     """Counter of messages.
 
-    A stream is identified by the bytes of its header, whose length depends on the version.
+    The key of a stream is the bytes of system, component and message id in the header: 5 in MAVLink 2, 3 in
+    MAVLink 1.
     """
 
     def __init__(self) -> None:
@@ -121,7 +125,7 @@ class _Tally:
         elif time < sender.first:
             sender.first = time
         if silence > SHORTEST_GAP:
-            # A silence of exactly a power of two belongs below it.
+            # A silence of exactly 2ⁿ µs is counted under the exponent n.
             sender.silences[(silence - 1).bit_length()] += 1
             sender.longest = max(sender.longest, silence)
 

@@ -1,9 +1,10 @@
 """Records of a log on one time line that never goes back.
 
 Clocks of recording computers are set, logs are joined, and single stamps are wrong. A stamp more than 1 s
-before or 60 s after the previous one must be confirmed: the next record is within 60 s of it, or there is
-none. Otherwise it is a single wrong stamp, and is replaced by the previous one. A confirmed stamp that is
-earlier, or more than a day later, begins a new stretch that follows the last one without a gap.
+before or more than 60 s after the previous time must be confirmed: the next record's stamp is within 60 s of
+it, or there is no next record. A stamp that is not confirmed is a single wrong stamp. It is replaced by the
+previous time, and so is a stamp that is earlier by 1 s or less. A confirmed stamp that is earlier, or more
+than a day later, begins a new stretch that follows the last one without a gap.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from collections.abc import Iterable, Iterator
 from mavlink_bridge.tlog.log import Record
 
 IDLE = 5_000_000
-"""Longest silence (µs) that is waited for; of a longer silence the rest is skipped."""
+"""Longest silence (µs) that replays keep; they shorten or skip longer ones."""
 _MAX_BACK_US = 1_000_000
 _MAX_AHEAD_US = 86_400_000_000
 _MAX_UNCONFIRMED_US = 60_000_000
-"""A stamp further ahead (µs) must be confirmed: the next is at most as far from it."""
+"""Largest advance (µs) of a stamp that needs no confirmation; largest distance of a confirming next stamp."""
 
 
 def on_one_line(records: Iterable[Record]) -> Iterator[Record]:

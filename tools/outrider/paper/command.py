@@ -34,7 +34,8 @@ def paper(
 
     The status is 0 if all was flown, 1 after a violation of d_min or a failed run, and 3 after an
     interruption. A row that gets stuck is a result, not an error. Writes ``paper.json``, ``paper.md`` and
-    figures beside the journal in ``out`` (``runs/sweep-paper``, ``runs/sweep-paper-firmware``).
+    figures beside the journal in ``out`` (default ``runs/sweep-paper``, for the response ``firmware``
+    ``runs/sweep-paper-firmware``).
     """
     found = cells_of(rows, response)
     name = "paper" if response == "exact" else f"paper-{response}"

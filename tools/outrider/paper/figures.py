@@ -71,7 +71,7 @@ def _gradient(axes: Axes, trace: Mapping[str, Any]) -> None:
 
 
 def _times(rows: Sequence[Row], results: Sequence[Result]) -> Figure:
-    """Draw the medians, with the worst above them, beside the paper's; stuck rows are hatched to the top."""
+    """Draw median and longest times to converge beside the paper's; stuck rows are hatched to the top."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 4.5), layout="constrained")

@@ -16,8 +16,9 @@ from outrider.sweep.statistics import least, plain
 class Result:
     """Result of one row of the table.
 
-    ``median_s`` is None if half of the runs or more did not converge; ``worst_s`` is the longest time of
-    those that did. ``converged``, ``stuck`` and ``failed`` count runs; ``failed`` runs have no usable flight.
+    ``median_s`` is None if more than half of the runs did not converge; ``worst_s`` is the longest time of
+    the runs that converged. ``converged``, ``stuck`` and ``failed`` count runs; ``failed`` runs have no
+    usable flight.
     """
 
     scenario: str

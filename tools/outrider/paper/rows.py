@@ -42,7 +42,7 @@ ROWS = (
 def cells_of(rows: tuple[Row, ...], response: Response = "exact") -> list[Cell]:
     """Return the cell of each row: the shipped scenario with its method, on autopilots of that ``response``.
 
-    The flight starts in the air, because the paper's clock does so too.
+    The flight starts in the air, because the paper counts its times from vehicles in the air.
     """
     found = []
     followed = {} if response == "exact" else {"autopilot.response": response}

@@ -18,8 +18,8 @@ from outrider.runs import names
 class ImpairedLink:
     """``node`` behind ``network``, of which each channel leads from one sender to ``node``.
 
-    ``senders``: for each link the node at its other end, or None if there are several, which the system id in
-    the header identifies. Data from other senders, possible on a multicast group, is dropped.
+    ``senders``: for each link the node at its other end, or None if there are several; the system id in the
+    header then identifies the sender. Data from other senders, possible on a multicast group, is dropped.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ from outrider.realtime.wiring import Wiring
 from outrider.realtime.workers import ProcessResults, Worker
 
 _EXIT_TIMEOUT_S = 10.0
-"""s that a process has to write its results."""
+"""Time limit (s) for the processes to write their results and end."""
 
 
 class Processes(Children):

@@ -66,7 +66,8 @@ def spawn(
         )
     for index, k in enumerate(fleet.with_backup):
         backup_node = fleet.backup_of(k)
-        # Both ends of its link to the autopilot count as the companion's: they are on one computer.
+        # The node's link ``autopilot`` receives data of the autopilot and of the companion. Both count as
+        # sent by the companion, which is on the same computer.
         behind = rough(fleet, backup_node, {"autopilot": names.companion(fleet.systems[k]), "swarm": None})
         turn = start + staggered(2 * len(fleet.systems) + index, _slots(fleet), timing.companion_us)
         every = Scheduled(behind, timing.companion_us, turn, fleet.clock(k, start))

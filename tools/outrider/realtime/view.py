@@ -35,7 +35,7 @@ class Seen(NamedTuple):
 class ViewedNode(Protocol):
     """State that companions and vehicles provide for a view.
 
-    ``attitudes`` (K, 4) FRD in NED, ``plans`` (K, KNOTS, 6), K ``states``.
+    ``attitudes`` (K, 4): quaternions w x y z, FRD in NED; ``plans`` (K, KNOTS, 6); K ``states``.
     """
 
     @property
@@ -55,7 +55,7 @@ class ViewedNode(Protocol):
 
 
 class RealTimeView:
-    """View at one end of ``line``; changes by hand are recorded in ``orders``."""
+    """Connection by ``line`` to the view's process; ``orders`` records the changes that its user makes."""
 
     def __init__(self, line: DatagramChannel) -> None:
         self._line = line

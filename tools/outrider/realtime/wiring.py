@@ -80,8 +80,8 @@ def wire(vehicles: int, clock: Clock, moving: int = 0, backup_nodes: int = 0) ->
             operator.append(opening(f"udpout:{_HOST}:{_port(ground)}"))
         backups = []
         for autopilot, companion in list(zip(autopilots, companions, strict=True))[:backup_nodes]:
-            # The backup node sends its set-points to the autopilot. It receives the data of both, and so
-            # detects whether the companion sends.
+            # The backup node sends its set-points to the autopilot. It receives the data of the autopilot and
+            # of the companion, and so detects whether the companion sends.
             ends = [opening(f"udpin:{_HOST}:0"), opening(f"udpin:{_HOST}:0")]
             for node, end in zip((autopilot, companion), ends, strict=True):
                 node["autopilot"].append(opening(f"udpout:{_HOST}:{_port(end)}"))

@@ -157,7 +157,7 @@ class Worker:
         self.remains.dropped = counters.dropped + statistics.overruns
 
     def _stepped(self, now: int) -> None:
-        # After sending, so that writing a log delays no set-point.
+        # This is called after the step's output is sent, so that writing a log delays no set-point.
         self.rough.show(self._taps)
         goal = self.board.goal
         if goal and not self._goal_seen:
@@ -273,7 +273,7 @@ class CompanionWorker(Worker):
 
 
 class PlayedWorker(Worker):
-    """A node that the harness plays: the target, or a moving obstacle."""
+    """A simulated node that is neither autopilot nor companion: the target, or a moving obstacle."""
 
     def __init__(self, node: Target | MovingObstacle, slot: NodeEnvironment) -> None:
         super().__init__(slot)

@@ -49,7 +49,10 @@ def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[
 
 
 class _Shares:
-    """Progress reports to ``watch`` for the ``steps`` of one of several logs."""
+    """Progress reports to ``watch`` for the ``steps`` of one of several logs.
+
+    ``which``: index of the log, and number of logs.
+    """
 
     def __init__(self, watch: Watch, name: str, which: tuple[int, int], steps: int) -> None:
         self._watch, self._name, self._which, self._steps = watch, name, which, steps

@@ -29,9 +29,9 @@ _LONGEST_S = 3600.0
 def prepared(log: Path, seen: OwnRecords, target: int, like: str) -> Prepared:
     """Return a flight of one vehicle around the recorded ``target``.
 
-    It has the companion's settings of the scenario ``like`` and lasts from the first record of the log to the
-    last, an hour at most. ``seen`` is the survey of the target. Raises InputError for settings that cannot be
-    flown.
+    It has the companion's settings of the scenario ``like``, except the task (escort) and the horizontal
+    flight box (around the target's positions). It lasts as long as the log, an hour at most. ``seen`` is the
+    survey of the target. Raises InputError for settings that cannot be flown.
     """
     base = load(find("scenarios", like), Scenario)
     limits, fleet = base.companion.limits, seen.fleet

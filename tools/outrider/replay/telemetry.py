@@ -20,7 +20,8 @@ from mavlink_bridge.wire.header import header
 from outrider.logs.timeline import IDLE, on_one_line
 
 # Messages that an autopilot takes as sensor input are left out: ODOMETRY, DISTANCE_SENSOR, ADSB_VEHICLE,
-# SYSTEM_TIME and similar. A vehicle that follows another by its GLOBAL_POSITION_INT would follow a log.
+# SYSTEM_TIME and similar. GLOBAL_POSITION_INT is included, so a vehicle in a follow mode may follow a
+# recorded vehicle.
 TELEMETRY: Final = frozenset(
     (
         mavlink.MAVLINK_MSG_ID_HEARTBEAT,

@@ -68,7 +68,8 @@ def charts(
 ) -> list[Chart]:
     """Return all charts that have data, over the samples ``shown`` (n,).
 
-    ``late`` (s), by system id: how much a vehicle's clock is ahead (``clocks.errors``); plans have its time.
+    ``late`` (s), by system id: how much a vehicle's clock is ahead (``clocks.errors``); the times of its
+    plans are on that clock.
     """
     found = [_separation(run, motions, shown)]
     where = _where(run, motions)

@@ -1,8 +1,8 @@
 """Time offsets between the clocks of the logs and the flight's clock.
 
 Each companion has a clock of its own, and a real-time run starts at an arbitrary time. A log and the flight
-start within a second or so of each other. From there the velocity reported by the autopilot is shifted in
-time against the true velocity; the best fit gives the offset of the clocks.
+start within ``REACH`` of each other. ``offset`` shifts the velocity reported by the autopilot in time against
+the true velocity; the shift with the best fit is the offset of the clocks.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ _COARSE, _FINE = 0.1, 0.005
 _MIN_SPEED = 0.05
 """Speed (m/s) that a vehicle must have reached for a fit."""
 _MAX_VELOCITIES = 3000
-"""Approximate number of velocities used; so many suffice."""
+"""Half of the bound on the number of velocities in a fit; the velocities of a longer log are thinned."""
 
 
 def offset(log: Log, motions: Motions) -> float:
     """Return the seconds to add to a time of ``log`` to get seconds after the goal event.
 
     Times of the log count from its first record. The offset is accurate to the delay between vehicle and
-    companion, about 20 ms.
+    companion, about 20 ms. If no fit is possible (an unknown vehicle, fewer than two velocities, or a vehicle
+    that did not move), the log is assumed to begin with the first sample of ``motions``.
     """
     guess = float(motions.time[0])
     if log.owner not in motions.system or len(log.moments) < 2:

@@ -39,8 +39,9 @@ class ReportPage(NamedTuple):
 def report(directory: Path, out: Path | None = None, as_json: bool = False) -> int:
     """Write the page of the run in ``directory``, print its path and return the exit status.
 
-    The page goes to ``out``, by default to ``report.html`` in the directory. Raises InputError if the
-    directory holds no run, or if the destination exists and is not a report.
+    With ``as_json`` a JSON object with the path and key figures is printed instead of the path. The page goes
+    to ``out``, by default to ``report.html`` in the directory. Raises InputError if the directory holds no
+    run, or if the destination exists and is not a report.
     """
     from outrider.terminal.share_progress import share_progress
 

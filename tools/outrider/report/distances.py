@@ -13,7 +13,7 @@ from outrider.report.run import Array, Motions
 from outrider.scenarios.scenario import Scenario
 
 _MIN_HEIGHT = 0.2
-"""Height (m) below which a vehicle may stand on the ground beside the target or an obstacle."""
+"""Height (m) below which a vehicle may stand on the ground: there, only distances between vehicles count."""
 _MERGE_S = 0.1
 """Time (s) around an encounter that counts as part of it."""
 
@@ -21,8 +21,8 @@ _MERGE_S = 0.1
 class Encounter(NamedTuple):
     """Violation of a distance limit from ``begin`` to ``end`` (s after the goal event).
 
-    ``least`` (m) is the smallest distance, at ``time``. ``who`` has the system ids, or the name of the second
-    party.
+    ``least`` (m) is the smallest distance, at ``time``; ``limit`` (m) is the violated limit. ``who``: the
+    vehicle's system id, then the other vehicle's system id, or "the target" or "an obstacle".
     """
 
     begin: float
@@ -56,7 +56,8 @@ def to_obstacles(motions: Motions, scenario: Scenario) -> Array:
 def encounters(motions: Motions, d_min: float, scenario: Scenario | None) -> list[Encounter]:
     """Return all violations in order of time: vehicles closer than ``d_min`` (m), and the scenario's limits.
 
-    For pairs of vehicles only samples with a finite separation count, that is with a pair in the air.
+    For pairs of vehicles only samples with a finite separation count: samples at which at least two vehicles
+    were in the air.
     """
     flies = np.isfinite(motions.separation)
     found = []

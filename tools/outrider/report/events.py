@@ -34,9 +34,10 @@ class Event(NamedTuple):
 
 
 def events(run: Run, near: Sequence[Encounter], offsets: dict[int, float], end: float) -> list[Event]:
-    """Return all events of a run up to ``end`` (s after the goal event), in order of time.
+    """Return all events of a run, in order of time.
 
-    ``offsets`` are the offsets of the logs' clocks by owner; logs without one are omitted.
+    Events of the scenario after ``end`` (s after the goal event) are omitted. ``offsets`` are the offsets of
+    the logs' clocks by owner; a log without an offset is omitted.
     """
     found = [*_goal(run), *_encounters(near)]
     if run.scenario is not None:
@@ -85,7 +86,7 @@ def _encounters(near: Sequence[Encounter]) -> Iterator[Event]:
 
 
 def _scenario(scenario: Scenario) -> Iterator[Event]:
-    """Yield the events that the scenario's file defines."""
+    """Yield the events that the scenario's file defines, except clock faults, which last the whole flight."""
     for fault in scenario.faults:
         if not isinstance(fault, ClockFault):
             until = getattr(fault, "for_s", None)

@@ -17,7 +17,7 @@ class Fact(NamedTuple):
 
 
 class Headline(NamedTuple):
-    """Headline: ``verdict`` is good, bad or open, ``outcome`` is a sentence."""
+    """Headline: ``verdict`` is good, bad or open (not known), ``outcome`` is a sentence."""
 
     verdict: str
     outcome: str
@@ -25,9 +25,10 @@ class Headline(NamedTuple):
 
 
 def headline(run: Run, lost: float | None) -> Headline:
-    """Return the headline from the summary, without which the outcome is unknown, and the share ``lost``.
+    """Return the headline of a run.
 
-    ``lost`` is the share of lost messages, or None.
+    Without a summary the outcome is not known. ``lost`` is the share (0…1) of the swarm link's messages that
+    were lost, or None if it is not known.
     """
     facts = tuple(_facts(run.summary, lost))
     return Headline(*_outcome(run), facts)

@@ -13,7 +13,7 @@ from outrider.report.run import Log
 
 _SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 _PIECE_LENGTH = 50
-"""A STATUSTEXT of this length continues in the next one."""
+"""Length of a full STATUSTEXT: only a text of this length may continue in the next one."""
 
 
 class LogEvent(NamedTuple):

@@ -1,10 +1,11 @@
 """Lost messages of the swarm link, determined from the logs alone.
 
 On each of its links a companion has one codec, which numbers the sent messages modulo 256 for all receivers
-together. The swarm link's numbers of a sender therefore continue in the logs of all other vehicles, and the
-sender's own log has every message that it sent. If both logs are available, messages are compared byte by
-byte: that is exact, and duplicates are not counted twice. For a sender without a log (a moving obstacle, or a
-missing log) the gaps in its sequence numbers give the loss, from the first to the last message that arrived.
+together. The numbers of a sender's messages on the swarm link are therefore consecutive in a receiver's log
+if none is lost, and the sender's own log has every message that it sent. If both logs are available, messages
+are compared byte by byte: the comparison is exact, and duplicates are not counted twice. For a sender without
+a log (a moving obstacle, or a missing log) the gaps in its sequence numbers give the loss, from the first to
+the last message that arrived.
 """
 
 from __future__ import annotations
@@ -21,16 +22,17 @@ MODULO = 256
 _MAX_TIME_S = 86_400.0
 """Limit of time (s) before and after the goal event: a damaged time stamp may have any value."""
 _LONG_PAUSE_S = 2.0
-"""Time (s) in which no sender sends 128 messages; after more, whole cycles of numbers may be missing."""
+"""Time (s) in which no sender sends 128 messages; in a longer pause, 256 numbers or more may be missing."""
 
 
 class LossRate(NamedTuple):
     """Loss from one sender to one receiver (system ids): of ``sent`` messages ``lost`` did not arrive.
 
     ``exact`` is true if the sender's own log was used, and false if its sequence numbers were. The other
-    values count from the goal event on, if that is known: ``silence`` is the longest time (s) without a
-    message until the sender sent its last; ``usual`` is the 95th percentile of the times (s) between
-    arrivals. They are None if too few messages were sent or arrived.
+    values count from the goal event on, or from the start of the receiver's log if the goal event is not
+    known: ``silence`` is the longest time (s) without an arrival before the sender's last message; ``usual``
+    is the 95th percentile of the times (s) between arrivals. They are None if too few messages were sent or
+    arrived.
     """
 
     sender: int
@@ -68,8 +70,9 @@ class Losses(NamedTuple):
 class LossComparison:
     """Comparison of each sender's log with every receiver's log, as soon as both are available.
 
-    The messages received from a sender are kept until then, or to the end for a sender without a log: in less
-    than two minutes two hundred vehicles receive eighty million messages.
+    The messages received from a sender are kept only until both logs are available, or to the end for a
+    sender without a log, because in less than two minutes two hundred vehicles receive eighty million
+    messages.
     """
 
     def __init__(self) -> None:
@@ -92,7 +95,10 @@ class LossComparison:
         self._logs[log.owner] = new
 
     def close(self) -> Losses:
-        """Return the losses from every sender that has a log or was received, to every log."""
+        """Return the losses of all pairs of a sender and a vehicle with a log.
+
+        Pairs without a message are omitted.
+        """
         for owner, waiting in self._waiting.items():
             for system, streams in waiting.items():
                 self._keep(_by_numbers(system, owner, streams, self._logs[owner].goal))
@@ -110,9 +116,9 @@ class LossComparison:
 
 
 class _SenderLog(NamedTuple):
-    """``log`` without received messages, the offset ``ahead`` of its clock (s), and ``goal`` (µs by it).
+    """``log`` without received messages, the offset ``ahead`` of its clock (s), and ``goal`` (µs).
 
-    ``goal`` is the goal event, or the start of the log if that is later.
+    ``goal`` is the time on the log's clock of the goal event, or of the start of the log if that is later.
     """
 
     log: Log
@@ -152,8 +158,8 @@ def _exact(
 ) -> tuple[LossRate, Array, NDArray[np.bool_]]:
     """Compare both logs; ``goal`` is µs on the receiver's clock.
 
-    The second and the third value are the times (n,) of sending, µs since the start of the sender's log, and
-    whether (n,) each message was lost.
+    The second and the third value concern the n messages that count: the times (n,) of sending, µs since the
+    start of the sender's log, and whether (n,) each message was lost.
     """
     ours, stream = sender.sent, _joined(streams)
     marks, first, copies = np.unique(stream.mark, return_index=True, return_counts=True)
@@ -161,8 +167,8 @@ def _exact(
     there = ours.time.astype(np.float64)
     counted = np.ones(len(there), dtype=bool)
     if arrived.any():
-        # The clocks differ; messages in both logs give the difference. Messages outside the receiver's log
-        # are not counted.
+        # The clocks differ; messages in both logs give the difference. Messages sent before the receiver's
+        # log begins or after it ends are not counted.
         place = np.searchsorted(marks, ours.mark[arrived])
         there += np.median(stream.time[first[place]] - ours.time[arrived])
         counted = (there >= receiver.begin) & (there <= receiver.end)
@@ -223,8 +229,9 @@ def _silences(
 ) -> tuple[float | None, float | None]:
     """Return the longest time (s) without an arrival, and the 95th percentile of the times between arrivals.
 
-    Both count from ``since`` to the last message in ``ours``. Times are µs on one clock. Values are None if
-    too few messages arrived.
+    ``ours`` are the times of sending. Both values count from the first to the last message sent at ``since``
+    or later. Times are µs on one clock. Both are None if no message was sent, and the percentile is None if
+    fewer than two arrived.
     """
     ours = ours[ours >= since]
     if not len(ours):

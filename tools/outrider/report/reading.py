@@ -1,4 +1,7 @@
-"""Reader of a run directory. A part that cannot be read is a gap, unless no part can be read."""
+"""Reader of a run directory.
+
+A part that cannot be read is a ``Gap`` of the run; if no part can be read, ``read`` raises InputError.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ _ALLOWED = "allowed: what outrider swarm leaves"
 _MOST_BYTES = 1 << 20
 """Largest size of a summary or a configuration."""
 _DIGITS = 18
-"""Most digits of an integer: no count has more, and no float represents more."""
+"""Largest number of characters of an integer in a summary; no count needs more."""
 
 Watch = Callable[[str, float], None]
 Sift = Callable[[Log, Motions | None], Log]
@@ -36,9 +39,10 @@ def read(
 ) -> Run:
     """Read all data in ``directory``.
 
-    ``watch`` is called with the name of the file being read and the share that is done. ``sift`` receives
-    each log, and the true motions if they are available, and returns the part of the log to be kept. Raises
-    InputError if ``directory`` is not a directory, or holds no readable part of a run.
+    ``watch`` is called with the name of the log being read and the share (0…1) of all logs' bytes that have
+    been read. ``sift`` receives each log, and the true motions if they are available, and returns the part of
+    the log to be kept. Raises InputError if ``directory`` is not a directory, or holds neither a summary, nor
+    a configuration, nor true motions, nor a log that can be read.
     """
     if not directory.is_dir():
         wrong = "not a directory" if directory.exists() else "no such directory"

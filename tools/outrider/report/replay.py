@@ -21,7 +21,7 @@ from outrider.simulation.conductor import HOLD
 MILLIMETRE, TENTH = 1e-3, 1e-4
 """Quanta: of lengths and speeds, 1 mm and 1 mm/s; of angles and times, 0.1 mrad and 0.1 ms."""
 _AFTER = 5.0
-"""Time (s) for which a run is shown after convergence."""
+"""Time (s) for which a run is shown after the end of ``HOLD``, which begins with convergence."""
 
 
 class Packed(NamedTuple):

@@ -29,9 +29,10 @@ class Motions(NamedTuple):
     """Content of ``flight.npz``: T samples of K vehicles and M moving obstacles.
 
     Coordinates are fleet-local ENU, units SI and radians; missing values are NaN. ``system`` (K,); ``time``
-    (T,) s after the goal event, rising; ``position``, ``velocity``, ``reference`` (T, K, 3); ``yaw``,
-    ``tilt`` (T, K); ``target`` (T, 3); ``separation`` (T,): least since the sample before; ``moving`` (T, M,
-    3).
+    (T,) s after the goal event, rising; ``position``, ``velocity``, ``reference`` (the position that the
+    autopilot tracks) (T, K, 3); ``yaw``, ``tilt`` (T, K); ``target`` (T, 3); ``separation`` (T,): least
+    distance between two vehicles in the air since the sample before, infinite without such a pair; ``moving``
+    (T, M, 3): positions of the moving obstacles.
     """
 
     system: tuple[int, ...]
@@ -49,7 +50,8 @@ class Motions(NamedTuple):
 class Plans(NamedTuple):
     """Content of ``plans.npz``: n plans.
 
-    ``system`` (n,); ``time`` (n,) s after the goal event; ``size`` (n,): norm of ∇J divided by Ω_t, m.
+    ``system`` (n,); ``time`` (n,) s after the goal event; ``size`` (n,): norm of ∇J divided by Ω_t, m (see
+    ``flight_file.write_plans``).
     """
 
     system: NDArray[np.int64]
@@ -111,8 +113,8 @@ class Log(NamedTuple):
 class Run(NamedTuple):
     """All data of a run.
 
-    Where a part is among the ``gaps``, ``summary`` is empty and other parts are None. ``configuration`` is
-    the text of the file.
+    ``configuration`` is the text of the file. A part among the ``gaps`` that could not be read is None; for
+    the summary and the configuration it is empty, and a log is not in ``logs``.
     """
 
     directory: Path

@@ -1,4 +1,4 @@
-"""Tables of the page. All external text is escaped here, and nowhere else."""
+"""Tables of the page. All external text in the tables is escaped here."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ _SILENCES = (0.0, 0.3, 0.5, 1.0, 2.0, 4.0, 8.0)
 
 
 def summary_table(summary: Mapping[str, object]) -> str:
-    """Return the table of all keys of the summary, known keys first in the order of the glossary."""
+    """Return the table of the summary: keys of the glossary first, in its order, then all others.
+
+    Hidden keys and keys without a value are omitted.
+    """
     keys = [key for key in TERMS if key in summary]
     keys += [key for key in summary if key not in TERMS and key not in HIDDEN]
     rows = []

@@ -15,7 +15,7 @@ from outrider.report.run import Array, Motions
 PERIOD = 0.04
 """Time (s) between samples on the page."""
 MOST = 60_000
-"""Most samples, counted per vehicle: two minutes of twenty vehicles at 25 Hz, some 2.5 MB of page."""
+"""Largest number of samples times vehicles: two minutes of twenty vehicles at 25 Hz, some 2.5 MB of page."""
 
 
 def chosen(motions: Motions) -> NDArray[np.intp]:
@@ -35,9 +35,9 @@ def least(values: Array, indices: NDArray[np.intp]) -> Array:
 
 
 def largest(time: Array, values: Array, shown: Array) -> Array:
-    """Return the largest (n,) of ``values`` (m,) at ``time`` (m,) s since the time ``shown`` (n,) before.
+    """Return the largest (n,) of ``values`` (m,) between each time in ``shown`` (n,) and the one before.
 
-    It is NaN where there is none.
+    ``time`` (m,) are the times of the values; all times are s. The result is NaN where there is no value.
     """
     result = np.full(len(shown), np.nan)
     place = np.searchsorted(shown, time, side="left")

@@ -20,10 +20,10 @@ Whole = NDArray[np.int64]
 class Motion(NamedTuple):
     """True motion: T samples of K vehicles and M moving obstacles, fleet-local ENU, SI, radians.
 
-    Missing values are NaN. ``start_us``: Unix µs of the goal event; ``time`` (T,) Unix µs, ``time_s`` (T,) s
-    after the goal event; ``system`` (K,); ``position``, ``velocity``, ``reference`` (T, K, 3); ``yaw``,
-    ``tilt`` (T, K); ``target`` (T, 3); ``separation`` (T,); ``moving`` (T, M, 3): see
-    ``flight_file.write_flight``.
+    Missing values are NaN; ``separation`` is infinite if no two vehicles were in the air. ``start_us``: Unix
+    µs of the goal event; ``time`` (T,) Unix µs, ``time_s`` (T,) s after the goal event; ``system`` (K,);
+    ``position``, ``velocity``, ``reference`` (T, K, 3); ``yaw``, ``tilt`` (T, K); ``target`` (T, 3);
+    ``separation`` (T,); ``moving`` (T, M, 3): see ``flight_file.write_flight``.
     """
 
     start_us: int
@@ -44,8 +44,8 @@ class Plans(NamedTuple):
     """One value for each of n plans.
 
     ``time`` (n,) Unix µs and ``time_s`` (n,) s after the goal event, on the companion's clock; ``system``
-    (n,), the vehicle of each plan; ``value``: ∇J (n, 3), fleet-local ENU, m, or the CPU time (n,) of the plan
-    in ms.
+    (n,), the vehicle of each plan; ``value``: ∇J divided by Ω_t (n, 3), fleet-local ENU, m (see
+    ``flight_file.write_plans``), or the CPU time (n,) of the plan in ms.
     """
 
     time: Whole

@@ -26,8 +26,8 @@ class Resolved(BaseModel):
 def resolved(directory: Path, allowed: str, of_log: str | None = None) -> Resolved:
     """Return the configuration of the run in ``directory``.
 
-    Raises InputError, which states what is ``allowed``, if it is no run directory; ``of_log`` as for
-    ``configured``.
+    Raises InputError, which states what is ``allowed``, if ``directory`` is not a directory, and as
+    ``configured`` does; ``of_log`` as for ``configured``.
     """
     if not directory.is_dir():
         wrong = "not a directory" if directory.exists() else "no such directory"
@@ -38,8 +38,9 @@ def resolved(directory: Path, allowed: str, of_log: str | None = None) -> Resolv
 def configured(directory: Path, allowed: str, of_log: str | None) -> Resolved:
     """Return the configuration of the run in ``directory``, which must exist.
 
-    Raises InputError if it cannot be read or has no scenario, as the output of ``outrider fly``. For the
-    latter the error names ``of_log``, with the log's path in place of ``{}``; for None it names ``allowed``.
+    Raises InputError if the configuration cannot be read, or is that of ``outrider fly``, which has no
+    scenario. For a directory of ``outrider fly`` with a log, the error names ``of_log``, with the log's path
+    in place of ``{}``; without a log, or if ``of_log`` is None, it names ``allowed``.
     """
     path = directory / CONFIGURATION
     try:

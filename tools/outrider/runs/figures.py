@@ -129,7 +129,7 @@ def _errors(standoff: Axes, yaw: Axes, flight: Outcome, samples: Samples, time: 
 
 
 def _gradients(axes: Axes, flight: Outcome) -> None:
-    """Draw ‖∇J‖ of every plan: near 0 for a vehicle that has arrived (the paper, Sec. IV)."""
+    """Draw ‖∇J‖ / Ω_t of every plan: near 0 for a vehicle that has arrived (the paper, Sec. IV)."""
     for log in flight.plan_logs:
         time = (log.times - (flight.clock_start or 0)) * 1e-6
         axes.plot(time, np.linalg.norm(log.gradients, axis=1), lw=0.8)

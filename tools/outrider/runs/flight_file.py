@@ -1,4 +1,4 @@
-"""Writer of the ``.npz`` files of a run directory: true motions, and the costs and gradients of all plans."""
+"""Writer of the ``.npz`` files of a run directory: true motions, and CPU times and gradients of plans."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ def write_flight(flight: Outcome, path: Path) -> None:
     Missing values are NaN. ``system`` (K,); ``time_s`` (T,) after the goal event, which was at ``start_us``
     on the clock of the run (Unix µs, as in the logs) or, if there was none, is the first sample;
     ``position``, ``velocity``, ``reference`` (the position that the autopilot tracks) (T, K, 3); ``yaw``,
-    ``tilt`` (T, K); ``target`` (T, 3); ``separation`` (T,): least since the previous sample; ``moving`` (T,
-    M, 3). Lock-step writes the same bytes each time.
+    ``tilt`` (T, K); ``target`` (T, 3); ``separation`` (T,): least distance between two vehicles in the air
+    since the previous sample, infinite without such a pair; ``moving`` (T, M, 3). Lock-step writes the same
+    bytes each time.
     """
     samples = flight.truth.samples()
     start = flight.clock_start or (int(samples.time[0]) if len(samples.time) else 0)
@@ -50,8 +51,9 @@ def write_plan_times(flight: Outcome, path: Path) -> None:
 def write_plans(flight: Outcome, path: Path) -> None:
     """Write arrays with a row for each plan.
 
-    ``system``; ``time_s`` after the goal event, on the companion's clock; ``gradient`` (n, 3), ∇J divided by
-    Ω_t, fleet-local ENU, m. Lock-step writes the same bytes each time.
+    ``system``; ``time_s`` after the goal event, on the companion's clock; ``gradient`` (n, 3), the gradient
+    ∇J of the cost (eq. (11) of the paper) divided by the weight Ω_t of the final position, fleet-local ENU,
+    m. Lock-step writes the same bytes each time.
     """
     logs = flight.plan_logs
     start = flight.clock_start or 0

@@ -1,6 +1,6 @@
 """Formation error: distance of vehicles from their surfaces around the target.
 
-Convergence and stand-off error are defined by it.
+The stand-off error is this distance; convergence without goals is defined by it.
 """
 
 from __future__ import annotations

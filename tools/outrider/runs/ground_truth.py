@@ -32,7 +32,8 @@ class Samples(NamedTuple):
 
     ``time`` (T,) µs; ``position``, ``velocity``, ``acceleration``, ``reference``, ``estimate_error``
     (estimated less true position) (T, K, 3); ``yaw``, ``tilt`` (T, K); ``target`` (T, 3); ``separation``
-    (T,): least distance between vehicles since the previous sample; ``moving`` (T, M, 3): moving obstacles.
+    (T,): least distance between vehicles in the air since the previous sample, infinite without such a pair;
+    ``moving`` (T, M, 3): moving obstacles.
     """
 
     time: NDArray[np.int64]

@@ -39,8 +39,11 @@ class Punctuality(NamedTuple):
 class Outcome:
     """A finished flight; times in µs on the clock of the run, None for events that did not occur.
 
-    ``tallies``: per companion at the start of the clock and at its end. ``punctuality`` is that of a
-    real-time run; lock-step has none. ``plan_logs``: per companion, on its own clock.
+    ``clock_start``: goal event, from which the time of the flight counts ("the clock"); ``clock_end``: end of
+    this time, before the landing. ``converged_at``: start of the convergence. ``span`` (m): a vehicle's size
+    from tip to tip. ``tallies``: for each companion its counters at ``clock_start`` and at ``clock_end``.
+    ``punctuality`` is that of a real-time run; lock-step has none. ``plan_logs``: per companion, on its own
+    clock.
     """
 
     scenario: Scenario

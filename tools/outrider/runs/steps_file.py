@@ -19,8 +19,8 @@ from outrider.runs.array_file import read_arrays
 class StepsFile:
     """Collector of step times (µs), which writes them to ``path`` when it is closed.
 
-    Steps usually follow at equal gaps. In memory each run of equal gaps is one gap and its length (at least
-    1), so a day takes next to no memory.
+    The gaps between steps are usually equal. A sequence of equal gaps is kept in memory as the gap and the
+    number (at least 1) of these gaps, so a day takes little memory.
     """
 
     def __init__(self, path: Path) -> None:
@@ -42,7 +42,7 @@ class StepsFile:
             self._counts.append(1)
 
     def close(self) -> None:
-        """Write the first time, and the gaps, which compress to almost nothing."""
+        """Write the first time and all gaps; equal gaps take little space in the compressed file."""
         first = np.array([] if self._first is None else [self._first], dtype=np.int64)
         gaps = np.repeat(np.array(self._gaps, dtype=np.int64), np.array(self._counts, dtype=np.int64))
         np.savez_compressed(self._path, first=first, gaps=gaps)

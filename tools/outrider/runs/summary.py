@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Value = float | int | str | bool | None | dict[str, float] | dict[str, float | None] | dict[str, int]
 
 WALL_FIELDS = ("plan_ms", "wall_s", "cpu_s", "real_time_factor", "run_dir")
-"""Keys that may differ between two runs of one seed."""
+"""Keys that may differ between two lock-step runs of one seed."""
 
 
 class Cost(NamedTuple):

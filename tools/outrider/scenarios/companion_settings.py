@@ -11,7 +11,8 @@ def settings_of(scenario: Scenario) -> CompanionConfig:
     """Return the companions' settings, completed from the scenario.
 
     They include the scenario's obstacles; ``field.position_sigma``, at least that of the sensor profile; and,
-    with certified avoidance, the ids of the vehicles as ``certified.fleet`` unless it is given.
+    with certified avoidance, the ids of the vehicles without bystanders as ``certified.fleet`` unless it is
+    given.
     """
     companion, profile = scenario.companion, PROFILES[scenario.sensors]
     known = (*companion.obstacles, *scenario.obstacles)

@@ -36,9 +36,9 @@ class Radio(Settings):
 
 
 RADIOS = {57600: Radio(state_us=400_000, plan_us=540_000, plan_stale_us=1_200_000)}
-"""Rates by the baud that eight vehicles share with their target, signed or not (``link_budget``).
+"""Rates by the baud of a radio that eight vehicles and their target share, signed or not (``link_budget``).
 
-A receiver that misses one plan still has the previous one, of 1.6 s.
+A receiver that misses one plan continues with the previous plan, which is 1.6 s long.
 """
 
 

@@ -68,8 +68,9 @@ MovingPart = Annotated[MovingSpherePart | MovingPostPart, Field(discriminator="k
 def clashes(moving: Sequence[Moving], fleet: range, target: int, known: Sequence[Moving]) -> Iterator[str]:
     """Yield a sentence for each system id of an obstacle that is in use already.
 
-    ``moving`` are the obstacles that the scenario flies, ``known`` the other ones that the companions are
-    configured with.
+    If the ids of ``fleet`` reach those of moving obstacles, a sentence states the largest fleet. ``moving``
+    are the obstacles that the scenario flies, ``known`` the other ones that the companions are configured
+    with.
     """
     if moving and fleet[-1] >= FIRST_MOVING:
         most = FIRST_MOVING - FIRST_SYSTEM

@@ -43,7 +43,8 @@ class Options(NamedTuple):
 def apply(scenario: Scenario, options: Options) -> Scenario:
     """Return the scenario with the options' changes, checked again as a whole.
 
-    Raises InputError with the wrong option and its allowed values.
+    Certified avoidance with the turning sense ``own`` changes the turning sense to ``right``. Raises
+    InputError with the wrong option and its allowed values.
     """
     changes: dict[str, object] = {}
     companion: dict[str, object] = {}
@@ -87,7 +88,7 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
     try:
         return Scenario.model_validate({**scenario.model_dump(), **changes})
     except ValidationError as error:
-        # An option may stand for several links, whose faults are then one.
+        # An option may change several links; their equal errors are reported once.
         faults = dict.fromkeys(_fault(one, options) for one in error.errors())
         raise InputError(*faults) from None
 

@@ -28,7 +28,7 @@ def overlaps(faults: Sequence[FaultPart], partitions: Sequence[PartitionPart]) -
     """Yield a sentence for each pair of equal faults or partitions that overlap in time.
 
     Faults are equal if they have one kind and one vehicle, partitions if they have the same members. A
-    clock's fault lasts the whole flight. Faults without an end are not checked, because another cannot end
+    clock's fault lasts the whole flight. Faults without an end are not checked, because no other fault ends
     them.
     """
     periods = []

@@ -41,7 +41,8 @@ class Ring(Part):
     def radius_of(self, count: int) -> float:
         """Return the radius (m) with ``count`` vehicles.
 
-        With any jitter within the bounds, neighbours are at least ``apart`` from each other.
+        If ``apart`` is given, neighbours are at least ``apart`` from each other with any jitter within its
+        bounds.
         """
         if self.apart is None or count < 2:
             return self.radius

@@ -12,7 +12,7 @@ _MAX_DATAGRAM_BYTES = 1 << 20
 class DatagramChannel:
     """One ``end`` of the channel, with ``room`` (bytes).
 
-    ``dropped``: datagrams for which there was no room or no receiver.
+    ``dropped``: number of datagrams for which there was no room or no receiver.
     """
 
     def __init__(self, end: socket.socket, room: int = ROOM) -> None:

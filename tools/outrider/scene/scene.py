@@ -32,13 +32,15 @@ class Solid(NamedTuple):
 class Scene(NamedTuple):
     """Static content of a view; lengths in m, fleet-local ENU.
 
-    ``systems`` (K): ids of the vehicles, of which the first ``tasked`` fly the task. ``d_min``, ``d_safe``
-    between centres, ``d_min_target`` to the target, ``d_min_solid`` to a surface; None where it is not known.
-    ``movers`` (M): shapes of the moving obstacles. ``goals`` (k, 3). ``surfaces``: closed lines (n, 3) as
-    offsets from the target. ``centre`` (3,) and ``reach``: the initial centre of the view, and the distance
-    from there within which the content lies. ``follows``: whether the view moves along with the vehicles.
-    ``step_s``: step of plans with separating planes; None for a fleet without them. ``levers``: what the view
-    may change, ``methods`` and ``loss`` as they are at first.
+    ``systems`` (K): ids of the vehicles, of which the first ``tasked`` fly the task. ``d_min``: least allowed
+    distance between vehicles' centres; ``d_safe``: distance between centres below which the repulsive field
+    acts; ``d_min_target``: least allowed distance to the target; None where a distance is not known or does
+    not apply. ``d_min_solid``: least allowed distance from a centre to an obstacle's surface. ``movers`` (M):
+    shapes of the moving obstacles. ``goals`` (k, 3). ``surfaces``: closed lines (n, 3) as offsets from the
+    target. ``centre`` (3,) and ``reach``: the initial centre of the view, and the distance from there within
+    which the content lies. ``follows``: whether the view moves along with the vehicles. ``step_s``: step of
+    plans with separating planes; None for a fleet without them. ``levers``: what the view may change,
+    ``methods`` and ``loss`` as they are at first.
     """
 
     title: str

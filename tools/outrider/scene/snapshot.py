@@ -17,9 +17,9 @@ KNOTS = 17
 class State(NamedTuple):
     """State of one vehicle.
 
-    ``mode``: phase and kind of its horizon; ``age_s``: age of the oldest data among its neighbours;
-    ``plan_ms``: CPU time of its last plan; ``held``: how often an old plan was kept. NaN and None for unknown
-    values.
+    ``mode``: phase, and whether the vehicle keeps an old plan or brakes; ``age_s``: age of the oldest data
+    among its neighbours; ``plan_ms``: CPU time of its last plan; ``held``: how often an old plan was kept.
+    NaN and None for unknown values.
     """
 
     mode: str = ""

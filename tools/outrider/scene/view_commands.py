@@ -28,7 +28,7 @@ class ViewCommands(NamedTuple):
 
     ``speed``: multiple of real time, None for as fast as possible; ``paused``; ``steps``: number of requested
     single steps. ``methods`` joined by + and ``loss`` (0…1): None leaves the present value. ``target`` (3,)
-    m, fleet-local ENU: new position of the target, for the ``moves``-th time.
+    m, fleet-local ENU: last position to which the user moved the target; ``moves``: number of these moves.
     """
 
     speed: float | None = None

@@ -21,8 +21,8 @@ _COLUMNS = (
 def document_of(found: ShadowRun) -> dict[str, object]:
     """Return the results for scripts.
 
-    They describe the set-points that would have been sent and, under ``sent``, those that were; ``apart_m``
-    is the distance between the two.
+    They describe the set-points that would have been sent and, under ``sent``, those that were sent;
+    ``apart_m`` has the 50th and 95th percentiles of the distance between the two.
     """
     would, sent = facts(found.would), facts(found.sent)
     off = apart(course(found.would), course(found.sent))

@@ -41,7 +41,7 @@ class Part(Enum):
 
 @dataclass(frozen=True)
 class Roles:
-    """System ids of the roles; ``neighbours`` None: all others that report their position."""
+    """System ids of the roles; ``neighbours`` None: all systems without another role."""
 
     own: int
     neighbours: frozenset[int] | None = None
@@ -65,12 +65,12 @@ class Roles:
 class OwnRecords(NamedTuple):
     """Result of a first pass over the own vehicle's records.
 
-    ``place``: its first position with a fix (°, °, m above mean sea level), or without any fix its first
-    position, at 0°, 0°; ``above_home``: height (m) of ``place`` above home; ``origin``: its first
-    GPS_GLOBAL_ORIGIN, or the origin computed from one position in both frames; ``local``: whether it sends
-    LOCAL_POSITION_NED. ``systems`` are all senders, ``placed`` those that report their position; ``begin``
-    and ``end`` of the log, µs; ``reach``: its largest horizontal distance (m) from ``place``, of those within
-    5 km.
+    ``place``: the vehicle's first position with a fix (°, °, m above mean sea level), or without any fix its
+    last position, at 0°, 0°; ``above_home``: height (m) of ``place`` above home; ``origin``: its first
+    GPS_GLOBAL_ORIGIN, or the origin computed from one position in both frames, or None without either;
+    ``local``: whether it sends LOCAL_POSITION_NED. ``systems`` are all senders, ``placed`` those that report
+    their position; ``begin`` and ``end`` of the log, µs; ``reach``: the vehicle's largest horizontal distance
+    (m) from ``place``; distances of 5 km and more are ignored as implausible.
     """
 
     place: tuple[float, float, float]

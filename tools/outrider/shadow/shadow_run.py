@@ -156,9 +156,10 @@ def _given(
 
 
 class _Substitute:
-    """Substitute for messages of the own autopilot that the log lacks.
+    """Substitute for messages of the own autopilot that the log may lack.
 
-    It adds the origin, once, and local positions, derived from the global ones.
+    It adds the origin, once, before the autopilot's first message. If the log has no LOCAL_POSITION_NED of
+    the vehicle, it adds local positions derived from the global ones.
     """
 
     def __init__(self, own: int, seen: OwnRecords, fleet: FleetFrame) -> None:

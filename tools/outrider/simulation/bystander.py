@@ -1,4 +1,4 @@
-"""Bystander: a vehicle outside the ring that reports its position and ignores all other vehicles."""
+"""Bystander: a vehicle without the fleet's task that reports its position and ignores all other vehicles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ DEAF_TO = "swarm"
 class Bystander(Companion):
     """Companion that receives nothing on the swarm link.
 
-    It hovers or flies to its goal, and does not give way. Its settings let it share no plan.
+    It hovers or flies to its goal, and does not give way. Its settings (``Fleet.companion_config_of``)
+    prevent it from sharing plans.
     """
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:

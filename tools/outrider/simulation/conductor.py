@@ -19,11 +19,11 @@ from outrider.simulation.operator import Operator
 from sitl.estimation.profiles import PROFILES
 
 NEAR, SLOW, HOLD = 0.3, 0.3, 1_000_000
-"""Limits of convergence: distance (m), speed relative to the target (m/s), duration (µs)."""
+"""Limits of convergence: distance from the place (m), speed (m/s), duration (µs)."""
 _SIGMAS = 2.0
-"""Minimum convergence distance in σ of the sensors' position error.
+"""Multiple of the σ of the sensors' position error; the limit of the distance is at least this product.
 
-With the profiles ``truth`` and ``rtk`` it is less than ``NEAR``.
+With the profiles ``truth`` and ``rtk`` the product is less than ``NEAR``.
 """
 HOVERING = 0.1
 """Maximum speed of a hover (m/s), with exact sensors; the clock starts when every vehicle hovers."""
@@ -81,7 +81,7 @@ def _intruders(scenario: Scenario) -> list[_Intruder]:
 
 
 def _turning_speed(scenario: Scenario) -> float:
-    """Return the largest speed (m/s) of a vehicle due to the ring's rotation; 0 if the ring does not turn."""
+    """Return the largest speed (m/s) of a vehicle due to the formation's turn rate; 0 if that is zero."""
     companion = scenario.companion
     if not companion.turn_rate:
         return 0.0
@@ -161,7 +161,7 @@ class Conductor:
         now, still = sight.now, _MAX_HOVER_SPEED_M_S[self._scenario.sensors]
         if self._scenario.weather.w20 > 0.0:
             still = _MAX_HOVER_SPEED_IN_TURBULENCE_M_S
-        # The vehicles of a ring that turns are never at rest.
+        # The vehicles of a formation that turns around the target are never at rest.
         still += self._turning
         calm = sight.ready and float(np.linalg.norm(sight.velocities, axis=1).max()) < still
         if not calm:

@@ -44,9 +44,10 @@ Onlooker = Callable[["Flight", int], None]
 class Flight:
     """Flight of a scenario's nodes for one seed.
 
-    ``progress`` is called with the stage and simulated seconds. Each vehicle's tlog is written to the
-    ``run_directory``, if there is one. ``stopwatch`` (ns) measures planning. ``reverse_nodes`` reverses the
-    order in which nodes step. The ``onlooker`` may change the nodes and the network.
+    ``progress`` is called with the stage and the simulated seconds since the goal event, or before it since
+    the beginning. Each vehicle's tlog is written to the ``run_directory``, if there is one. ``stopwatch``
+    (ns) measures planning. ``reverse_nodes`` reverses the order in which nodes step. The ``onlooker`` may
+    change the nodes and the network.
     """
 
     def __init__(
@@ -149,7 +150,7 @@ class Flight:
         return over
 
     def _begin(self, now: int) -> None:
-        """Process the goal event: record the tallies, start target, moving obstacles and autopilots."""
+        """Process the goal event: record the tallies, and inform target, moving obstacles and autopilots."""
         self._tally_at_start = [c.tally for c in self.companions]
         self.target.begin(now)
         for moving in self.moving:

@@ -25,7 +25,7 @@ class Motion(NamedTuple):
 class ClosedPath:
     """Closed trigonometric polynomial through ``places`` (n, 3), m, at evenly spaced parameters.
 
-    ``length``: of one round, m.
+    ``length``: length of one round, m.
     """
 
     def __init__(self, places: Array) -> None:
@@ -119,7 +119,7 @@ class Walk:
 def _profile(paces: Sequence[tuple[float, float]], gain: float) -> tuple[Array, Array, Array, Array]:
     """Return pieces of constant acceleration, each (n,).
 
-    For each piece: its beginning (s), and from then on the distance covered (m), the speed (m/s) and the
+    For each piece: its beginning (s), the distance covered (m) and the speed (m/s) at its beginning, and its
     acceleration (m/s²). If a pace ends before its speed is reached, the next one starts from the speed
     reached.
     """

@@ -1,4 +1,4 @@
-"""Preparation of a scenario for flight, and flights that return only the summary."""
+"""Preparation of a scenario for flight, and flights that write no files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Target as a node: it sends GLOBAL_POSITION_INT on its link; its true position is known to the harness."""
+"""Target as a node: it sends GLOBAL_POSITION_INT on its link; the simulation knows its true position."""
 
 from __future__ import annotations
 
@@ -224,8 +224,8 @@ class Recorded:
 def load(config: RecordedTarget, path: Path, fleet: FleetFrame) -> Recording:
     """Return the piece of the log that ``config`` selects, in the order of time.
 
-    Raises InputError if the log cannot be read, if it ends more than ``SHORT`` before the piece, or if the
-    piece holds fewer than two GLOBAL_POSITION_INT of the system.
+    Raises InputError if the log cannot be read, if it ends more than ``SHORT`` before the end of the piece,
+    or if the piece holds fewer than two GLOBAL_POSITION_INT of the system.
     """
     wanted = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, config.system
     codec = Codec(lambda identifier, system, _component: (identifier, system) == wanted)

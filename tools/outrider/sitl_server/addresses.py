@@ -1,8 +1,8 @@
 """Endpoints of each vehicle: the ports of the firmware's own SITL, and additional ones.
 
 ArduPilot's instance i serves TCP at 5760 + 10 i (SERIAL0), 5762 + 10 i and 5763 + 10 i (SERIAL1 and 2). PX4's
-binds UDP 14580 + i and sends to 14540 + i (offboard; from the tenth on all to 14549, as PX4 does). It also
-binds 18570 + i and sends to 14550, the ground station.
+instance i binds UDP 14580 + i and sends to 14540 + i (offboard; from the tenth instance on all to 14549, as
+PX4 does). It also binds 18570 + i and sends to 14550, the ground station.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ from outrider.sitl_server.processes import Processes
 from outrider.sitl_server.request import Request
 
 _POLL_PERIOD_S: Final = 0.1
-"""Time between two polls of the board (s)."""
+"""Time between two polls of the shared page (s)."""
 
 
 class Terms(NamedTuple):
@@ -105,7 +105,7 @@ def _opened(places: Sequence[Address], clock: Clock) -> list[list[Link]]:
 
 
 def _wait(processes: Processes, stopped: Sequence[object], count: int) -> None:
-    """Wait until all vehicles are up."""
+    """Wait until all vehicles are up, or a signal ends the run."""
     while not stopped and not all(processes.board.snapshot(index).up for index in range(count)):
         time.sleep(0.02)
         processes.check()

@@ -57,7 +57,8 @@ def summary(asked: Request, board: SharedPage, wall: float) -> dict[str, Value]:
 def factor(paces: Sequence[Pace], since: Sequence[Pace] = ()) -> float:
     """Return simulated over wall time of the slowest process.
 
-    With ``since`` (earlier timings) it is the factor since then, if wall time has passed in every process.
+    With ``since`` (earlier timings) it is the factor since then, if wall time has passed in every process. In
+    all other cases it is the factor of the whole run.
     """
     before = since or [Pace()] * len(paces)
     spans = [

@@ -32,7 +32,7 @@ def groups(count: int, speed: float, most: int) -> list[list[int]]:
 class Processes:
     """Worker processes, one per group of vehicles; ``links`` by vehicle.
 
-    After ``start`` this process has no link open.
+    After ``start`` the parent process has no link open.
     """
 
     def __init__(self, asked: Request, links: list[list[Link]], state: Path | None) -> None:

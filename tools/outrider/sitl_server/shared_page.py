@@ -17,9 +17,10 @@ MAX_TEXTS: Final = 8
 class VehicleSnapshot(NamedTuple):
     """Snapshot of one vehicle.
 
-    ``position`` (m) and ``velocity`` (m/s) are true, ENU from the request's origin. ``battery`` is 0…1.
-    ``received`` and ``sent`` count messages. ``clients`` are those connected, or received within 10 s.
-    ``said`` counts the texts so far; ``time`` is s since boot.
+    ``up``: whether the vehicle's process has written a snapshot. ``position`` (m) and ``velocity`` (m/s) are
+    true, ENU from the request's origin. ``battery`` is 0…1. ``received`` and ``sent`` count messages.
+    ``clients``: number of TCP clients that are connected and of UDP clients that sent something within the
+    last 10 s. ``said`` counts the texts so far; ``time`` is s since boot.
     """
 
     up: bool = False
@@ -38,8 +39,10 @@ class VehicleSnapshot(NamedTuple):
 class Pace(NamedTuple):
     """Timing of one process.
 
-    Simulated and wall time (s) since its loop began, steps, ``misses``: steps that were late by more than
-    10 ms, of wall time at speeds above 1, deadlines without a step, lateness (simulated ms), and overruns.
+    ``simulated`` and ``wall``: time (s) since its loop began; ``steps``: number of steps; ``misses``: number
+    of steps more than 10 ms late (wall time at speeds above 1, simulated time otherwise); ``skipped``: number
+    of deadlines without a step; ``late_p99`` and ``late_max``: lateness of steps (simulated ms);
+    ``overruns``: number of datagrams dropped because too many waited.
     """
 
     simulated: float = 0.0
@@ -116,7 +119,7 @@ class SharedPage:
         self._memory.write(index * MAX_TEXTS + number % MAX_TEXTS, text)
 
     def saying(self, index: int, number: int) -> str:
-        """Return the text ``number`` of vehicle ``index``, one of its latest."""
+        """Return the text ``number`` of vehicle ``index``, one of its latest ``MAX_TEXTS``."""
         return self._memory.read(index * MAX_TEXTS + number % MAX_TEXTS)
 
     def show_pace(self, group: int, pace: Pace) -> None:

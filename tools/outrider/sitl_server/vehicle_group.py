@@ -13,7 +13,10 @@ from outrider.sitl_server.traffic import Traffic
 from sitl.node import LINK, Autopilot
 
 SPREAD: Final = 240_000
-"""Simulated time over which vehicles boot (µs), so that not all telemetry is due at the same time."""
+"""Simulated time over which the vehicles of a group boot (µs), so that their telemetry is not due at once.
+
+At speeds below 1 it is multiplied by the speed.
+"""
 SHOWN: Final = 0.2
 """Wall time between two snapshots of a vehicle (s)."""
 

@@ -27,7 +27,7 @@ of a previous companion. After the second time without messages it counts as gon
 class DuplicateIds:
     """Detector of a duplicate on the links of the companion of ``system``.
 
-    A duplicate is a sender with the companion's ids whose frames are not identical to the last
+    A duplicate is a sender with the companion's ids whose frames differ from each of the last
     ``REMEMBERED`` frames of the companion itself. ``clock``: wall clock.
     """
 

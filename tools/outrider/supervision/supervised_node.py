@@ -1,8 +1,9 @@
-"""Companion under supervision: its clock follows the autopilot's, and it can be replaced by a hold on exit.
+"""Companion under supervision: its clock may follow the autopilot's, and a hold on exit can replace it.
 
-Until the rate of that clock is known, nothing is received from or sent to the swarm and the target, because
-the ages of their messages are computed on the own clock, and no order to take off is accepted. Nor is one
-accepted while another sender has the own ids; then a pending order to take off is withdrawn.
+Until the rate of a followed clock is known, nothing is received from or sent to the swarm and the target,
+because the ages of their messages are computed on the companion's clock, and no order to take off is
+accepted. No such order is accepted either while another sender has the companion's ids; then a pending order
+to take off is withdrawn.
 """
 
 from __future__ import annotations
@@ -71,9 +72,10 @@ class SupervisedNode:
         return "" if self.settled else CLOCK
 
     def give_up(self) -> None:
-        """Stop the set-points and send the hold on exit from now on.
+        """Replace the companion by the hold on exit, which sends no set-points.
 
-        Called when the parent process is lost.
+        It requests the hold mode only if the companion controlled the vehicle. Called when the parent process
+        is lost.
         """
         if self.last is None:
             pilot = self.companion.pilot

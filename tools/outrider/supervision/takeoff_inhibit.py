@@ -24,7 +24,7 @@ class TakeoffInhibit:
         self._codec = Codec(None, signing, LINKS.index("ground"))
 
     def closed(self, inbox: Sequence[Datagram]) -> tuple[list[Datagram], list[Datagram]]:
-        """Return ``inbox`` without orders to take off for this companion, and the answers (COMMAND_ACK)."""
+        """Return ``inbox`` without orders to take off for this companion, and COMMAND_ACKs that deny them."""
         passed, answers = [], []
         for datagram in inbox:
             frames, end = leading_frames(datagram.data) if datagram.link == "ground" else ((), 0)

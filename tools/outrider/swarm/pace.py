@@ -10,12 +10,12 @@ from outrider.scene.view_commands import ViewCommands
 LEASE = 2.0
 """Time for which a command applies after it was received (s)."""
 STEP = 100_000
-"""Simulated time of a single step (µs)."""
+"""Simulated time (µs) that a paused simulation advances for each requested single step."""
 _NAP_S = 0.02
 
 
 class Pace:
-    """Pace by the commands of a view; ``clock``: wall clock (s); ``nap``: sleep for so many s."""
+    """Pace by the commands of a view; ``clock``: wall clock (s); ``nap``: function that sleeps (s)."""
 
     def __init__(
         self, clock: Callable[[], float] = time.monotonic, nap: Callable[[float], None] = time.sleep

@@ -32,7 +32,11 @@ from outrider.sweep.tasks import AbandonedError, Ended, Entry, Task
 PATIENCE_S = 300.0
 """Time (s) that a sweep waits for a worker."""
 _IDENTIFY = "__import__('outrider.sweep.dask_tasks', fromlist=['identify']).identify()"
-"""Given as text: a Dask worker that cannot find a function ends, and outrider may not be installed there."""
+"""Expression that a new worker evaluates.
+
+It is a text, because a Dask worker ends if it cannot import a function that it receives, and outrider may not
+be installed there.
+"""
 _TICK_S, _POLL_PERIOD_S, _FETCH_TIMEOUT_S, _CLOSE_TIMEOUT_S, _REPLY_TIMEOUT_S = 0.5, 1.0, 2.0, 3.0, 20.0
 
 
@@ -177,7 +181,7 @@ class Cluster:
                     return
 
     def _answered(self, flight: _Flight, backlog: Backlog, ended: Ended) -> bool:
-        """Return whether the answer could be fetched."""
+        """Process the answer of ``flight``, and return whether it could be fetched."""
         answer = self._fetched(flight.future)
         if answer is not None:
             self._take(answer, flight, backlog, ended)

@@ -66,7 +66,7 @@ class WorkerProcesses:
     def dismiss(self, sweep: str, only: Process | None = None) -> None:
         """End all processes of a sweep and start no more; or, with ``only``, that process if it is idle.
 
-        A ``fly`` that waits for one of the processes returns the entry of a lost run.
+        A ``fly`` whose task one of the processes is running returns the entry of a lost run.
         """
         with self._lock:
             idle = self._idle.get(sweep, {})

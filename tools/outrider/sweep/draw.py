@@ -1,7 +1,7 @@
 """Scenario drawn from a scene and a seed, the same every time.
 
 Each group of quantities has its own stream of random numbers, so a change of one group leaves the random
-numbers of the others as they are. Positions that depend on it may still change.
+numbers of the others as they are. Positions that depend on the changed group may still change.
 """
 
 from __future__ import annotations
@@ -129,7 +129,8 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
     if scene.trouble is not None:
         struck = strike(scene.trouble, count, stream(seed, Stream.SCENE_TROUBLE))
         document = overlay(document, leaves(struck))
-    # From the last jump: a minute, and three times the duration of the longest path at full speed.
+    # Time limit: the time of the last jump (0 without jumps), plus a minute, plus three times the duration of
+    # the longest path at full speed; at most an hour.
     way = 2.0 * math.sqrt(2.0) * (extent + radius)
     document["cap_s"] = float(min(3600, math.ceil(last_jump + 60.0 + 3.0 * way / dial.speed)))
     return overlay(document, leaves(scene.scenario))

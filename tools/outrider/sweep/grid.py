@@ -75,8 +75,8 @@ class Sweep(Part):
 class Point(NamedTuple):
     """One combination: ``source`` with ``changes`` by dotted key.
 
-    ``label`` names the combination within the sweep by the values that differ between cells; each key is
-    shortened to its end if that is unique.
+    ``label`` names the combination within the sweep: by its values of ``grid`` and ``vary``, each with the
+    shortest end of its key that is unique, and by the source if there are several sources or no such values.
     """
 
     source: str

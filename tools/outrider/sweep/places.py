@@ -1,7 +1,8 @@
 """Random positions with distance from each other: of vehicles, of a jumping target, of obstacles.
 
-Each is drawn clear of those before it (random sequential addition). Without enough room InputError is raised.
-All values are whole millimetres, so that a file holds exactly what was checked.
+Each vehicle and each obstacle is drawn clear of those before it (random sequential addition); without enough
+room InputError is raised. Each position of the target has a given distance from the one before it. All values
+are whole millimetres, so that a file holds exactly what was checked.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ class Circles(NamedTuple):
 def scatter(random: np.random.Generator, scene: Scene, count: int, half: float, what: str) -> Array:
     """Return positions (count, 3), m, in a square of ± ``half`` m.
 
-    The horizontal distance of any two is at least ``apart``. Raises InputError if there is no room; ``what``
-    names the positions in its message.
+    The horizontal distance of any two is at least ``scene.apart`` (m). Raises InputError if there is no room;
+    ``what`` names the positions in its message.
     """
     placed = np.empty((count, 3))
     heights = _mm(random.uniform(*scene.height, size=count))
@@ -83,8 +84,9 @@ def obstacles(
 ) -> list[JsonValue]:
     """Return ``counts[0]`` spheres, then ``counts[1]`` posts, as in a scenario file.
 
-    Their centres are in a square of ± ``extent`` m. Horizontally, each surface is at least ``clear`` from the
-    circles in ``kept`` and ``gap`` from other obstacles. Raises InputError if there is no room.
+    Their centres are in a square of ± ``extent`` m. Horizontally, each surface is at least ``scene.clear``
+    (m) from the circles in ``kept`` and ``scene.gap`` (m) from other obstacles. Raises InputError if there is
+    no room.
     """
     placed = np.empty((0, 3))
     found: list[JsonValue] = []
@@ -138,7 +140,7 @@ def _free(
 
 
 def _apart(points: Array, others: Array) -> Array:
-    """Return the distances (n, m) of points (n, 2) and others (m, 2), m."""
+    """Return the distances (n, k), m, of ``points`` (n, 2) from ``others`` (k, 2)."""
     off = points[:, None] - others[None]
     return np.asarray(np.hypot(off[..., 0], off[..., 1]))
 

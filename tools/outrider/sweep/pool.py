@@ -17,7 +17,7 @@ from outrider.sweep.process import Process
 from outrider.sweep.tasks import Ended, Entry, Task
 
 MOST_STARTS = 5
-"""Number of workers in a row that may die before they are ready; more indicates a permanent error."""
+"""Number of workers in a row that die before they are ready, after which no more are started."""
 _TICK_S = 0.5
 
 

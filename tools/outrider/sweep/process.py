@@ -18,7 +18,10 @@ from outrider.errors import OutriderError
 from outrider.sweep.tasks import Entry, Task
 
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""Limits libraries to one thread: there are as many workers as cores, and more threads slow them down."""
+"""Variables that limit libraries to one thread.
+
+By default there are as many workers as cores, and more threads would slow them down.
+"""
 
 
 class _Reply(NamedTuple):
@@ -33,7 +36,9 @@ class _Reply(NamedTuple):
 class Process:
     """Worker process and the pipe to it.
 
-    ``task`` is its current task, ``since`` the start time of it (monotonic, s).
+    ``task`` is its current task, ``since`` the time at which it received that task (monotonic, s). ``ready``:
+    it has imported its function; ``cannot``: the reason why it could not; ``dead``: its output has ended, or
+    it was killed.
     """
 
     def __init__(self, run: str) -> None:

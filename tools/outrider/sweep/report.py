@@ -27,7 +27,8 @@ Command = Callable[[int], str]
 class Spread(NamedTuple):
     """Distribution of one figure over the runs of a cell.
 
-    ``extreme`` is the least separation, or the largest error.
+    ``extreme`` is the least distance, or the largest error; ``tail`` is the 5th percentile of distances, or
+    the 95th of errors.
     """
 
     extreme: float | None
@@ -52,8 +53,8 @@ class Named:
 class CellReport:
     """Summary of a cell.
 
-    ``violations``, ``stuck``, ``failed``, ``faults`` and ``lost`` count runs. Times in s, separations in m.
-    The tail is p5 for separations, p95 for times and errors.
+    ``violations``, ``stuck``, ``failed``, ``faults`` and ``lost`` count runs. Times in s, distances in m.
+    ``yaw`` (deg) and ``tracking`` (m) are distributions of each run's 95th percentile of the error.
     """
 
     label: str
@@ -199,7 +200,7 @@ def _named(runs: Sequence[Run], command: Command) -> tuple[Named, ...]:
     """Return the runs to be named: every run that raised an error or is lost, and a few of each other kind.
 
     The order is: violations, runs that failed or are stuck, the smallest distances, the longest times, then
-    errors and lost runs. Each run occurs once; equal runs are in the order of seeds.
+    errors and lost runs. Each run occurs once; runs with the same distance are in the order of seeds.
     """
 
     def nearness(run: Run) -> float:

@@ -16,7 +16,11 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:\[\]]+):
 
 
 def connected(address: str) -> Any:
-    """Return a `distributed.Client` of the scheduler at ``address``. Raises InputError if there is none."""
+    """Return a `distributed.Client` of the scheduler at ``address``.
+
+    Raises InputError if the address is malformed, TLS is not set up here, no scheduler answers, or the
+    scheduler has another version of Dask.
+    """
     found = _ADDRESS.fullmatch(address)
     if found is None or not 0 < int(found["port"]) < 65536:
         raise InputError(

@@ -53,7 +53,7 @@ def quantile(values: Sequence[float], level: float) -> Interval | None:
     """Return the quantile of ``values`` at ``level`` with a 95 % interval; None without values.
 
     The quantile is the least value that at least a share ``level`` of the sample does not exceed; the bounds
-    are values of the sample. Raises ValueError if ``level`` is not between 0 and 1.
+    are values of the sample, or infinite. Raises ValueError if ``level`` is not between 0 and 1.
     """
     if not 0.0 < level < 1.0:
         raise ValueError(f"level {level} is not between 0 and 1")
@@ -61,7 +61,7 @@ def quantile(values: Sequence[float], level: float) -> Interval | None:
     count = len(ordered)
     if count == 0:
         return None
-    # 0.95 · 20 is 19.000000000000004 in floats: its rank is 19.
+    # Subtracted because of rounding: 0.55 · 100 is 55.00000000000001 in floats, and its rank is 55.
     middle = ordered[max(1, ceil(level * count - 1e-9)) - 1]
     lower, upper = ranks(count, level)
     low = ordered[lower - 1] if lower >= 1 else -inf

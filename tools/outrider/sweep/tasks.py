@@ -14,7 +14,7 @@ class Task(NamedTuple):
     """One run, identified by ``key`` (the hash of what is flown) and ``seed``.
 
     ``document`` is the scenario as JSON, or, if ``is_scene``, the scene that draws a scenario for the seed.
-    ``vehicle`` is its vehicle as JSON.
+    ``vehicle`` is the scenario's vehicle as JSON.
     """
 
     key: str

@@ -110,7 +110,7 @@ class Replayed(Setpoints):
     """Set-points that a companion would have sent to a log's vehicle.
 
     ``sent``: those that were sent to it; ``reasons``: number of 10 ms steps without a set-point, by the
-    missing input.
+    missing input; ``holds``: how often the companion kept an old plan.
     """
 
     def __init__(self, name: str, found: ShadowRun, golden: Golden) -> None:

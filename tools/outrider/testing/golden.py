@@ -1,4 +1,4 @@
-"""Golden files: set-points of a flight that was inspected and accepted, as text for a diff."""
+"""Golden files: set-points of a flight that was inspected and accepted, as CSV compressed with gzip."""
 
 from __future__ import annotations
 
@@ -42,8 +42,9 @@ class Golden:
     def check(self, name: str, whose: str, of: Course, within: float) -> None:
         """Compare the set-points ``of`` with the golden file ``name``, or write it.
 
-        Raises AssertionError, which says where and by how much, if they differ; ValueError for a bad ``name``
-        or ``within``. See ``Setpoints.assert_golden``.
+        Raises AssertionError if they differ (its text says where and by how much), if there are no
+        set-points, or if the file is missing or damaged; ValueError for a bad ``name`` or ``within``. See
+        ``Setpoints.assert_golden``.
         """
         __tracebackhide__ = True
         if not within > 0.0:

@@ -69,7 +69,10 @@ def changed(name: str, changes: dict[str, Any]) -> Scenario:
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Return ``base`` with ``changes`` merged in; mappings of the same ``kind`` are merged, too."""
+    """Return ``base`` with ``changes`` merged in.
+
+    Two mappings under the same key are merged, too, unless the new one names another ``kind``.
+    """
     result = deepcopy(base)
     for key, value in changes.items():
         inner = result.get(key)

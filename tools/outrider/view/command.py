@@ -49,7 +49,7 @@ class Terms(NamedTuple):
 def view(sources: Sequence[str], terms: Terms) -> int:
     """Show ``sources`` until Ctrl-C, SIGTERM or the end of the time, and return the exit status.
 
-    Raises InputError if the sources cannot be shown.
+    With ``terms.html``, write the run to that file instead. Raises InputError if the sources cannot be shown.
     """
     if len(sources) == 1 and ":" not in sources[0] and not sources[0].startswith("/dev/"):
         with share_progress() as watch:

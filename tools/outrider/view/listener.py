@@ -26,7 +26,7 @@ LOST, EXTRAPOLATION_S, FRESH = 10.0, 0.5, 1.0
 """Limits of age (s).
 
 A vehicle without a GLOBAL_POSITION_INT for LOST is no longer drawn; its position is extrapolated with its
-velocity for CARRIED; attitudes and plans are valid for FRESH.
+velocity for EXTRAPOLATION_S; attitudes and plans are valid for FRESH.
 """
 PICTURE, NEW_SCENE = 0.04, 1.0
 """Shortest time (s) between two snapshots, and between two scenes."""
@@ -98,7 +98,7 @@ class Listener:
         self._scene_at = self._begun = self._next = -np.inf
 
     def poll(self, wall: float) -> Sequence[Scene | Snapshot]:
-        """Return a scene when the shown vehicles change, and snapshots at the rate of the picture."""
+        """Return a scene after a new vehicle or the first roster, and a snapshot at most once in PICTURE."""
         for link, datagrams, codec in self._links:
             for data in link.receive():
                 for message in codec.feed(data, whole=datagrams):

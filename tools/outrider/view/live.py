@@ -76,7 +76,7 @@ class LiveSource:
         return found
 
     def command(self, commands: ViewCommands, sought: float | None) -> None:
-        """Pass the view commands on; a flight that is not simulated ignores them."""
+        """Pass the view commands on; a flight in real time ignores pause, steps and speed."""
         if self._player is not None:
             self._player.command(commands, sought)
         else:

@@ -78,8 +78,8 @@ class Panel:
     def watch(self, watched: bool) -> None:
         """Set whether any browser shows the page.
 
-        A flight runs in real time while it is watched. When no browser is left that could resume it, it
-        returns to its initial speed.
+        A flight whose initial speed is unlimited is set to real time when the first browser appears. When no
+        browser is left that could resume a flight, it is resumed at its initial speed.
         """
         if self._speed is None or watched == self._watched:
             return

@@ -26,7 +26,8 @@ class Plane(NamedTuple):
 def between(plan: Single, step_s: float) -> Plane:
     """Return the plane of each pair of ``plan`` (K, KNOTS, 6) at the segment where the pair is closest.
 
-    ``step_s`` is the duration of a segment (s). Pairs that start NEAR or more apart have no plane.
+    ``step_s`` is the duration of a segment (s). Pairs that start NEAR or more apart have no plane. Of more
+    than MOST planes, those with the smallest gaps are returned.
     """
     knots = plan.astype(np.float64)
     place, velocity = knots[..., :3], knots[..., 3:]
@@ -34,7 +35,7 @@ def between(plan: Single, step_s: float) -> Plane:
     controls = np.stack(
         [place[:, :-1], place[:, :-1] + 0.5 * step_s * velocity[:, :-1], place[:, 1:]], axis=2
     )
-    # The last knot is repeated: the curve stays there.
+    # A short plan repeats its last knot: in such a segment the vehicle stays there.
     still = np.isclose(place[:, :-1], place[:, 1:]).all(axis=2)
     controls[still] = place[:, :-1][still][:, None]
     one, other = np.triu_indices(len(plan), 1)

@@ -88,7 +88,7 @@ class Player:
     def moment(self, time: float) -> Snapshot:
         """Return the snapshot at ``time`` (s after the goal event).
 
-        It has the last sample before that time and the data of the logs.
+        It has the last sample at or before that time (or the first one) and the data of the logs.
         """
         motion = self._motion
         row = max(int(np.searchsorted(motion.time_s, time, side="right")) - 1, 0)

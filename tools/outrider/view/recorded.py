@@ -74,7 +74,7 @@ class Record(NamedTuple):
         return None if index < 0 or now - self.heartbeat_times[index] > HEARTBEAT_LOST else self.beats[index]
 
     def age(self, now: int) -> float:
-        """Return the largest time (s) since the last position of another vehicle; NaN before the first."""
+        """Return the age (s) of the oldest among the other vehicles' last positions; NaN before the first."""
         last = [times[index - 1] for times in self.received.values() if (index := bisect_right(times, now))]
         return 1e-6 * (now - min(last)) if last else float("nan")
 

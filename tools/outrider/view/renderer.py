@@ -20,7 +20,11 @@ AZIMUTH, ELEVATION, FIELD = -1.15, 0.5, np.radians(40.0)
 """Initial view direction, as in the report, and field of view (rad)."""
 _AWAY = (0.0, 0.0, -1e4)
 _MAX_SIZE_FACTOR, _SIZE_SHARE = 3.0, 0.09
-"""Largest drawn size of a vehicle as a multiple of its span, and its usual size as a share of the reach."""
+"""Limits of the drawn size of a vehicle.
+
+It is the larger of the vehicle's span and the second value times the scene's reach, but at most the first
+value times the span.
+"""
 _TARGET = rgb("#17202a")
 _IDENTITY = (1.0, 0.0, 0.0, 0.0)
 _NO_LINE = np.zeros((1, 2, 3))

@@ -25,7 +25,7 @@ _WEIGHT_OF_NODE = 32
 
 
 class Flaw(NamedTuple):
-    """A fault, ``at`` this number of characters from the start of the text."""
+    """A fault; ``at`` is its distance from the start of the text, in characters."""
 
     at: int
     what: str
@@ -34,7 +34,8 @@ class Flaw(NamedTuple):
 class Scalar(NamedTuple):
     """A scalar.
 
-    ``text`` as written (unquoted), its ``value``, and whether it was ``plain``: neither quoted nor a block.
+    ``text`` without quotes and with escapes replaced, its ``value``, and whether it was ``plain``: neither
+    quoted nor a block.
     """
 
     at: int
@@ -77,7 +78,8 @@ Plain = None | bool | int | float | str | list["Plain"] | dict[str, "Plain"]
 class Parsed(NamedTuple):
     """Result of parsing.
 
-    ``tree`` is None if the text is empty or its syntax is broken; then ``flaws`` may say more.
+    ``tree`` is None if the text is empty or cannot be used (broken syntax, or a limit is exceeded). In the
+    second case ``flaws`` has the reason.
     """
 
     tree: Tree | None

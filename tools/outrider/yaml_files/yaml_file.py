@@ -54,7 +54,7 @@ def read(data: bytes, name: str, model: type[Model]) -> Model:
     flaws = [*flaws, *more]
     for line in () if flaws else str(_input_error(text, name, remarks)).splitlines():
         _remark(line)
-    # JSON has lists, but neither tuples nor enumerations: strict mode accepts them only from JSON.
+    # Strict mode accepts a list for a tuple, and a text for an enumeration, only from JSON.
     document = json.dumps(plain(tree), allow_nan=False)
     try:
         value = model.model_validate_json(document, strict=True)

@@ -16,10 +16,11 @@ class Scene(NamedTuple):
     """Inputs of one plan: own state and prediction, target and obstacles, fleet-local ENU, SI.
 
     ``prediction`` (N + 1, 3) is the previous plan at n = 0…N from now; ``gradient`` (3,) is the last ∇J, zero
-    at first. ``to_go`` (3,) leads from the vehicle to where its destination is *now*: in a moving formation,
-    what moves along with all vehicles is in no vehicle's way. ``target_end`` (3,) is the target's position at
-    the end of the horizon. ``surface`` is the surface around the target that the destination lies on, None
-    for a goal of its own.
+    at first. ``to_go`` (3,) leads from the vehicle to where its destination is *now*, not at the end of the
+    horizon: the common motion of a formation then does not make one vehicle an obstacle on the way of
+    another. ``target_end`` (3,) is the target's position at the end of the horizon. ``surface`` is the
+    surface around the target that the destination lies on; None if the destination is a goal without a
+    surface.
     """
 
     position: Array

@@ -1,16 +1,19 @@
 """Approach angle (Sec. III-D.2): a force around the target separates the vehicles' angles of approach.
 
 F_ang(n) = ‖∇J‖ F_hyp((θ_k(n) − θ_j(n))²) β̂,  β̂ ⊥ β = (x_R(n) − x_P)/‖x_R(n) − x_P‖,  horizontal.
-Eq. (15) adds it to the repulsion.
 
-These are eqs. (13) and (14), with deviations from the paper. The gradient is its norm divided by Ω_t. θ is
-the bearing from the target; a difference of two is wrapped before it is squared, and F_hyp has thresholds of
-its own in rad². β̂ points to where the difference grows, so β is taken from the target: taken from the
-destination, as printed, it reverses where the vehicle passes the circle, and inside the circle it points to
-where the difference shrinks. The sense is latched for as long as the encounter lasts; otherwise it chatters
-between two vehicles at one angle. Only others that may be met count: not those further off than ``reach``,
-and not those behind (further from the destination) by more than d_safe. The sum is clamped to ``force_max``,
-above u_max, or the input would cancel it. A vehicle that already moves across fast is not pushed further.
+k is the own vehicle, j an obstacle, x_R(n) the own predicted position, x_P the target. Eq. (15) adds the
+force to the repulsion.
+
+These are eqs. (13) and (14), with deviations from the paper. ‖∇J‖ is divided by Ω_t. θ is the bearing from
+the target; a difference of two is wrapped before it is squared, and F_hyp has thresholds of its own in rad².
+β̂ points to where the difference grows, so β is taken from the target: taken from the destination, as
+printed, it reverses where the vehicle passes the circle, and inside the circle it points to where the
+difference shrinks. With the turning sense ``own``, the sign of β̂ for an obstacle is latched for as long as a
+force acts; otherwise it would alternate between two vehicles at one angle. Only others that may be met count:
+not those further off than ``reach``, and not those that are further from the destination than the vehicle by
+more than d_safe. The sum is clamped to ``force_max``, above u_max, or the input would cancel it. A vehicle
+that already moves fast at a right angle to β is not pushed further.
 """
 
 from __future__ import annotations
@@ -55,7 +58,7 @@ class ApproachAngle:
         reach = np.hypot(out[:, 0], out[:, 1])
         beta = out / np.maximum(reach, _NEAR)[:, None]
         total = (senses @ strength) * np.minimum(reach / FADING, 1.0)
-        # A vehicle that already moves across is not made faster, or it never comes round.
+        # A vehicle that already moves fast across β in the direction of the force is not made faster.
         across = scene.velocity[1] * beta[:, 0] - scene.velocity[0] * beta[:, 1]
         total *= shares(reserve(np.sign(total) * across, config.pass_speed))
         force = np.zeros_like(influence.force)
@@ -63,9 +66,9 @@ class ApproachAngle:
         return influence._replace(force=influence.force + limit(force, config.force_max))
 
     def _met(self, scene: Scene) -> Array:
-        """Return (M, 1): 1 for those that may still be met, 0 for those left behind or too far off.
+        """Return (M, 1): 1 for obstacles that may still be met, 0 for those left behind or too far off.
 
-        The values fade between 0 and 1.
+        Over ``FADING`` (m) in between, the values fall from 1 to 0.
         """
         obstacles = scene.obstacles
         left = sqrt(scene.to_go @ scene.to_go)
