@@ -360,8 +360,8 @@ class Pilot:
             self._begin_landing()
 
     def _connect(self, now: int, view: View) -> list[Message]:
-        self.waiting_for = self._readiness.missing(view, go=self._height is not None)
         self._expire_go(now)
+        self.waiting_for = self._readiness.missing(view, go=self._height is not None)
         calls = self._readiness.requests(now)
         if not self.waiting_for and view.own is not None and view.local is not None:
             self._takeoff.begin(view.own)

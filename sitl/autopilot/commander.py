@@ -157,8 +157,8 @@ class Commander:
 
     def enter(self, mode: Mode, now: int) -> CommandRefusal | None:
         """Change to ``mode``."""
-        self._setpoints_lost = False
         if mode is self.mode:
+            self._setpoints_lost = False
             return None
         status = self.status(now)
         if mode is Mode.MISSION:
@@ -166,6 +166,7 @@ class Commander:
             status = status._replace(items=itinerary.total, takes_off=itinerary.takes_off)
         if refusal := self._flavour.mode_refusal(mode, status):
             return refusal
+        self._setpoints_lost = False
         self._switch(mode, now)
         if not self.armed or self._flavour.armable_mode(mode):
             self._chosen_mode = mode

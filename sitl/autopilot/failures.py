@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -54,7 +53,7 @@ class Failures:
     def _motor(self, instance: float, left: float) -> CommandRefusal | None:
         """Limit motor ``instance`` (1: the first, 0: all) to the fraction ``left`` (0…1) of its speed."""
         count = len(self._plant.vehicle.config.rotors)
-        if not math.isfinite(instance) or not 0 <= instance <= count:
+        if not instance.is_integer() or not 0 <= instance <= count:
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Failure refused: there are {count} motors")
         chosen = range(count) if instance == 0 else [int(instance) - 1]
         for index in chosen:

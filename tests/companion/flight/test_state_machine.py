@@ -90,6 +90,17 @@ def test_connecting_waits_and_names_what_is_missing(name):
         assert rig.pilot.phase is Phase.PREPARE
 
 
+@pytest.mark.parametrize("ticks", range(-2, 3))
+def test_a_go_that_expires_as_everything_becomes_ready_must_be_given_again(ticks):
+    """The vehicle becomes ready some ticks before or after the go expires."""
+    rig = Rig()
+    assert rig.pilot.go(HEIGHT)
+    rig.run(1e-6 * (CompanionConfig().guard.go_keeps_us + ticks * TICK), BEAT, ILL, acks=True)
+    rig.run(2.0, BEAT, HEALTHY, acks=True)
+    assert rig.pilot.phase is Phase.CONNECT
+    assert "the operator's go" in rig.pilot.waiting_for
+
+
 ORDER = {
     # Command, parameters, what it waits for, whether set-points flow once it is done.
     "ardupilot": (

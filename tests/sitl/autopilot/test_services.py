@@ -384,3 +384,11 @@ def test_no_parameter_of_a_command_upsets_it(calls, flavour):
         assert client.of("COMMAND_ACK")[-1].command == command
     client.wait(0.3)
     assert np.isfinite(client.rig.position).all()
+
+
+@pytest.mark.parametrize("instance", [0.5, 1.5, -1.0, 7.0, math.nan, math.inf])
+def test_a_motor_that_does_not_exist_cannot_be_stopped(instance):
+    """FAILURE_UNIT_SYSTEM_MOTOR (101), FAILURE_TYPE_OFF (1)."""
+    client = up("px4", failures="obeyed")
+    assert client.command(420, 101, 1, instance) == 2
+    assert client.command(420, 101, 1, 1) == 0
