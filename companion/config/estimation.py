@@ -20,7 +20,9 @@ class TrackConfig(Settings):
     sigma_turn: float = Field(
         0.0, ge=0.0, le=10.0, description="rad/s, of the rates at which its course turns; 0: it goes straight"
     )
-    turn_memory_us: Micros = Field(3_000_000, description="so long a turn lasts")
+    turn_memory_us: Micros = Field(
+        3_000_000, description="µs: time constant with which the turn rate decays to 0"
+    )
     delay_us: int = Field(
         20_000, ge=0, le=2_000_000, description="least age of a message when it arrives; jitter adds to it"
     )
@@ -36,12 +38,12 @@ class TrackConfig(Settings):
         22.46, description="on d² = yᵀS⁻¹y, χ² of six: 16.81 passes 99 % of what is true, 22.46 99.9 %"
     )
     jump: Positive = Field(
-        3.0, description="m and m/s: an innovation beyond it is refused too; it grows by this per second"
+        3.0, description="m and m/s: limit of the innovation; it grows by as much per second without a state"
     )
     witnesses: int = Field(
         2,
         ge=1,
         le=10,
-        description="number of refused measurements that are accepted if they agree with each other",
+        description="number of successive refused measurements that must agree to restart the track",
     )
     velocity_up: bool = Field(False, description="the sender's vz is positive up, contrary to MAVLink")

@@ -6,7 +6,7 @@ suspended for a while, or be removed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from heapq import heapify, heapreplace
 from itertools import pairwise
 from typing import Literal, NamedTuple, Protocol
@@ -60,7 +60,9 @@ class LockStep:
     """Loop that steps ``scheduled`` nodes over ``network`` in simulated time.
 
     All times are in µs. Periods and phases are whole multiples of ``base_tick``, which is a multiple of 4 µs.
-    The input buffer of a suspended node holds up to ``buffer`` datagrams. ``taps`` observe all steps.
+    The input buffer of a suspended node holds up to ``buffer`` datagrams. ``taps`` observe all steps. Nodes
+    ``elsewhere`` are stepped by another process: here only their ticks count, so that all processes run the
+    same ticks.
 
     Within a tick all due nodes first receive, then all step, then everything is sent: no node receives the
     output of another node from the same tick. A node whose clock deviates from true time is due at the first
@@ -78,11 +80,13 @@ class LockStep:
         base_tick: int,
         taps: Sequence[StepObserver] = (),
         buffer: int = BUFFER,
+        elsewhere: Collection[str] = (),
     ) -> None:
         entries = sorted(scheduled, key=lambda entry: entry.node.name)
         self._network = network
         self._taps = tuple(taps)
         self._buffer = buffer
+        self._elsewhere = frozenset(elsewhere)
         self._now = 0
         if base_tick <= 0 or base_tick % QUANTUM:
             raise ScheduleError(f"base tick = {base_tick} µs is not a positive multiple of {QUANTUM} µs")
@@ -168,7 +172,8 @@ class LockStep:
             index = due[0][1]
             schedule = self._schedules[index]
             heapreplace(due, (schedule.after(now), index))
-            schedules.append(schedule)
+            if schedule.name not in self._elsewhere:
+                schedules.append(schedule)
         return schedules
 
     def _tick(self, now: int, schedules: list[Schedule]) -> None:

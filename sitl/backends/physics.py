@@ -19,7 +19,7 @@ class BackendError(RuntimeError):
 
 
 class Physics(Protocol):
-    """One vehicle with its controller over its ground, in the site's NED frame."""
+    """One vehicle with its controller over its ground, in site NED (``sitl.values.origin``)."""
 
     @property
     def config(self) -> VehicleConfig:

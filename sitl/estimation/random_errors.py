@@ -18,7 +18,7 @@ from sitl.estimation.profiles import SensorProfile
 from sitl.values.setpoints import ZERO
 
 PERIOD: Final = 10_000
-"""Time between samples (µs): both filters run at 100 Hz."""
+"""Time between samples (µs): the estimators of both firmwares run at 100 Hz."""
 
 _DT: Final = PERIOD * 1e-6
 _BLOCK_SAMPLES: Final = 100
@@ -73,7 +73,7 @@ class RandomErrors:
         self._sample = 0
 
     def advance(self, sample: int) -> None:
-        """Advance to ``sample``; going back is not possible."""
+        """Advance to ``sample``, which must not decrease; this is not checked."""
         while sample - self._first >= _BLOCK_SAMPLES:
             self._first += _BLOCK_SAMPLES
             self._rows = self._block()

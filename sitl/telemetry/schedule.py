@@ -74,7 +74,7 @@ class Telemetry:
             self._streams[mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS] = _Stream(
                 q.estimator_status, rates.estimator_status
             )
-        # Active streams only: most are inactive, and a step need not check those.
+        # Active streams only: many are inactive, and a step need not check those.
         self._active: list[_Stream] = []
         self._requested: list[int] = []
         self.next_due = _NEVER

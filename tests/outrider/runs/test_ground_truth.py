@@ -16,7 +16,7 @@ from mavlink_bridge.node import Datagram
 from outrider.runs.ground_truth import SAMPLE, Encounters, GroundTruth, Limits
 from outrider.scenarios.scenario import FixedTarget
 from outrider.simulation.targets import StandingTarget
-from outrider.simulation.truth_observer import TruthObserver
+from outrider.simulation.truth_observer import MotionObserver, TruthObserver
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
 from sitl.vehicle.multirotor import Reference, VehicleState
@@ -146,6 +146,20 @@ def truth(vehicles: Sequence[OnRails], d_min_target: float | None = None) -> Gro
     return GroundTruth(len(vehicles), Limits(LEAST, d_min_target))
 
 
+class Observer:
+    """Both observers of a flight in one process."""
+
+    def __init__(self, vehicles: Sequence[Any], target: StandingTarget, truth: GroundTruth) -> None:
+        self._motions = MotionObserver(cast("list[Autopilot]", list(vehicles)))
+        self._truth = TruthObserver(target, truth)
+
+    def see(self, now: int) -> bool:
+        motions = self._motions.see(now)
+        if motions is not None:
+            self._truth.take(now, [motions])
+        return motions is not None
+
+
 def watch(
     vehicles: Sequence[OnRails],
     truth: GroundTruth,
@@ -155,7 +169,7 @@ def watch(
 ) -> list[int]:
     """Times at which a sample was taken, the target being ``at`` (m)."""
     target = StandingTarget(FixedTarget(kind="fixed", at=at), FLEET)
-    seen = TruthObserver(cast("list[Autopilot]", list(vehicles)), target, truth)
+    seen = Observer(vehicles, target, truth)
     taken = []
     for now in range(tick, round(seconds * 1e6) + 1, tick):
         for vehicle in vehicles:
@@ -240,7 +254,7 @@ def test_nothing_is_seen_twice() -> None:
     vehicles = [OnRails(lambda _: (0.0, 0.0, 5.0)), OnRails(lambda _: (0.1, 0.0, 5.0))]
     seen = truth(vehicles)
     target = StandingTarget(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET)
-    observer = TruthObserver(cast("list[Autopilot]", vehicles), target, seen)
+    observer = Observer(vehicles, target, seen)
     for vehicle in vehicles:
         vehicle.move(0, 5_000)
     assert observer.see(5_000)
@@ -266,7 +280,7 @@ def test_the_emulated_autopilot_is_watched_at_every_physics_step() -> None:
     config = AutopilotConfig(system_id=11, latitude=47.397742, longitude=8.545594, altitude=488.0)
     autopilot = Autopilot(config, FIREFLY, FLEET, 1)
     seen = GroundTruth(1, Limits(LEAST, 1.0))
-    observer = TruthObserver(
+    observer = Observer(
         [autopilot], StandingTarget(FixedTarget(kind="fixed", at=(0.0, 0.0, 0.0)), FLEET), seen
     )
     inbox: list[Datagram] = []

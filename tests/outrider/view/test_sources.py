@@ -207,13 +207,7 @@ def overheard(of: Any) -> Overhears:
     listener = Listener([ear], [True], 10, "")
     flight = Flight(of, FIREFLY, 1, LOGS, stopwatch=lambda: 0)
     found = Overhears(flight, ear, listener)
-    from mavlink_bridge.loops.lockstep import LockStep
-
-    loop = LockStep(flight._schedule(), flight.network, of.timing.base_tick_us, [found])
-    from outrider.simulation.flight import EPOCH, _Computers
-
-    computers = _Computers(loop, flight.network)
-    loop.run(EPOCH + 30_000_000, lambda now: flight._watch(now, computers))
+    flight.run((found,))
     return found
 
 

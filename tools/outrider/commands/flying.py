@@ -49,11 +49,16 @@ def swarm(
     realtime: Annotated[
         bool, typer.Option("--realtime", help="Ask for real-time priority; implies --real-time.")
     ] = False,
+    processes: Annotated[
+        int,
+        typer.Option(min=1, help="Processes that share the vehicles in lock-step; the bytes are the same."),
+    ] = 1,
     view: Annotated[bool, typer.Option("--view", help="Watch it in the browser (docs/view.md).")] = False,
     out: RunDirectory = None,
     as_json: AsJson = False,
 ) -> None:
     """Fly a scenario, in lock-step by default, and write logs, summary and picture to a run directory."""
+    from outrider.errors import Fault, InputError
     from outrider.report.command import NAME, make, write
     from outrider.runs.summary import exit_status
     from outrider.scenarios.options import Options
@@ -76,6 +81,9 @@ def swarm(
         flavour,
         response,
     )
+    if processes > 1 and (real_time or realtime):
+        wrong = f"is {processes} with --real-time, which has a process per node; allowed: one of the two"
+        raise InputError(Fault("--processes", wrong))
     prepared = prepare(scenario, options)
     with ExitStack() as open_:
         shown = None
@@ -85,7 +93,7 @@ def swarm(
             shown = open_.enter_context(showing())
         directory = flying.run_directory(out, prepared.scenario, seed)
         with progress(prepared.scenario.duration_s) as watch:
-            pace = flying.Pace(real_time or realtime, realtime)
+            pace = flying.Pace(real_time or realtime, realtime, processes)
             summary = flying.fly(prepared, seed, directory, watch, pace, shown)
         # A flight of many vehicles leaves a gigabyte of garbage; free it before the logs are read.
         gc.collect()

@@ -24,8 +24,8 @@ def wire(case: Case) -> Iterator[Finding]:
         yield Finding(
             f"{case.hearing.refused} frames were refused: {case.hearing.refusal}",
             Severity.WARNING,
-            "A sender on the link does not have the key, or repeats earlier frames.",
-            "Give the key to all legitimate senders; find out which others can send.",
+            "A sender on the link does not have the key, repeats earlier frames, or has a late clock.",
+            "Give the key to all legitimate senders, and set their clocks; find out which others can send.",
         )
     yield from _damage(case.hearing)
     yield from _load(case)
@@ -99,7 +99,8 @@ def _load(case: Case) -> Iterator[Finding]:
             Severity.WARNING,
             f"Position and attitude at the rates that fly asks for need {_FLY_BYTES_PER_S / 1e3:.1f} kB/s: "
             "messages will be late.",
-            "Set 921600 baud (SERIALn_BAUD, SER_TEL1_BAUD), or reduce its streams (SRn_…, MAV_n_MODE).",
+            "Set 921600 baud (SERIALn_BAUD, SER_TEL1_BAUD), "
+            "or reduce the autopilot's streams (SRn_…, MAV_n_MODE).",
         )
     else:
         yield Finding(what, Severity.OK, "There is room for what fly asks for.")

@@ -24,7 +24,8 @@ _BEAT: Final = b"beat"
 PARENT_TIMEOUT_S: Final = 5.0
 """Time without a message from the parent after which the child counts the parent as lost (s).
 
-A lost parent forwards no orders and sends no hold request at the end.
+Without a parent no orders arrive, and the autopilot is not asked to hold position when the child ends: the
+child then asks the autopilot itself (``SupervisedNode.give_up``).
 """
 _BEAT_PERIOD_S: Final = 0.5
 """Time between two beats (s)."""
@@ -110,7 +111,7 @@ class OrderLink:
         return LinkCounters(self._received, 0, 0)
 
     def fileno(self) -> int:
-        """Return the file descriptor, readable when there are orders."""
+        """Return the file descriptor, readable when a message from the parent waits."""
         return self._end.fileno()
 
     def receive(self) -> list[bytes]:

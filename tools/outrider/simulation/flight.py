@@ -6,35 +6,26 @@ The conductor leads the flight, the truth observer records it, and the scenario'
 from __future__ import annotations
 
 import time
-from collections import deque
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from companion.obstacles.moving import MovingObstacles
 from companion.obstacles.static import FixedObstacles
-from companion.planning.avoidance import Tally
-from companion.values.phase import Phase
-from mavlink_bridge.loops.garbage import seldom_collected
-from mavlink_bridge.loops.lockstep import LockStep, Scheduled
-from mavlink_bridge.network.simulated import SimulatedNetwork
-from outrider.runs import names
+from mavlink_bridge.loops.lockstep import StepObserver
 from outrider.runs.ground_truth import GroundTruth, Limits
 from outrider.runs.outcome import Messages, Outcome
-from outrider.runs.recorder import Recorder
-from outrider.scenarios.faults import Vanish
-from outrider.scenarios.links import PartitionPart
 from outrider.scenarios.scenario import Scenario
+from outrider.scene.changes import Change
 from outrider.simulation.conductor import Conductor, Observation, Stage
-from outrider.simulation.disturbances import Event, events, strike_autopilot, strike_computer
 from outrider.simulation.fleet import Fleet
+from outrider.simulation.team import Instructions, Report, Results, Team, obey, results_of, schedule
 from outrider.simulation.truth_observer import TruthObserver
+from outrider.simulation.vehicles import EPOCH, Share, Vehicles, VehicleSnapshot
 from sitl.vehicle.config import VehicleConfig
 
-EPOCH = 1_767_225_600_000_000
-"""Unix time (µs) of the beginning of every simulated flight: 2026-01-01 UTC, a date that log tools accept."""
-_MAX_DURATION_US = 10_000_000_000
-"""Upper bound of a flight (µs); the conductor ends every flight long before."""
+__all__ = ["EPOCH", "Flight", "Onlooker", "Progress", "truth_of"]
 
 Progress = Callable[[Stage, float], None]
 Onlooker = Callable[["Flight", int], None]
@@ -42,12 +33,13 @@ Onlooker = Callable[["Flight", int], None]
 
 
 class Flight:
-    """Flight of a scenario's nodes for one seed.
+    """Flight of a scenario's nodes for one seed, in one or several ``processes``.
 
     ``progress`` is called with the stage and the simulated seconds since the goal event, or before it since
     the beginning. Each vehicle's tlog is written to the ``run_directory``, if there is one. ``stopwatch``
     (ns) measures planning. ``reverse_nodes`` reverses the order in which nodes step. The ``onlooker`` may
-    change the nodes and the network.
+    read ``snapshots`` and ``change`` the flight. ``companions`` and ``autopilots`` are those of this process.
+    The result does not depend on the number of processes, to the bit.
     """
 
     def __init__(
@@ -61,44 +53,56 @@ class Flight:
         run_directory: Path | None = None,
         stopwatch: Callable[[], int] = time.thread_time_ns,
         onlooker: Onlooker | None = None,
+        processes: int = 1,
     ) -> None:
         self.scenario, self.seed = scenario, seed
         self.fleet = fleet = Fleet(scenario, vehicle, seed, logs)
         self.systems = fleet.systems
         self.target = fleet.target()
         self.moving = fleet.moving()
-        self.autopilots = [fleet.autopilot(k) for k in range(scenario.size)]
-        self.companions = [fleet.companion(k, stopwatch) for k in range(scenario.size)]
-        self.backup_nodes = [fleet.backup_of(k) for k in fleet.with_backup]
+        self._team = Team(fleet, processes, stopwatch, run_directory, watched=onlooker is not None)
+        share = Share(0, processes)
+        self._vehicles = Vehicles(fleet, share, stopwatch, run_directory, self._team.exchange)
+        self.autopilots = self._vehicles.autopilots
+        self.companions = self._vehicles.companions
+        self.network = self._vehicles.network
         self.operator = fleet.operator()
         self.truth = truth_of(scenario)
-        self.network = SimulatedNetwork(fleet.channels(), seed, scenario.timing.base_tick_us)
         self.conductor = Conductor(scenario, fleet.starts, self.operator, EPOCH)
-        self._observer = TruthObserver(self.autopilots, self.target, self.truth, self.moving)
+        self._observer = TruthObserver(self.target, self.truth, self.moving)
         self._progress = progress
         self._reverse = reverse_nodes
-        self._directory = run_directory
         self._onlooker = onlooker
-        self._events = deque(events(scenario))
-        self._vanished: set[int] = set()
-        self._tally_at_start: list[Tally] = []
-        self._tally_at_end: list[Tally] = []
+        self._changes: list[Change] = []
+        self._reports: list[Report] = []
+        self._others: list[Results] = []
 
-    def run(self) -> None:
-        """Fly to the end; ``outcome`` then holds the results."""
-        with ExitStack() as files, seldom_collected():
-            taps = []
-            if self._directory is not None:
-                taps.append(Recorder(self._directory, self.systems, files))
-            loop = LockStep(self._schedule(), self.network, self.scenario.timing.base_tick_us, taps)
-            computers = _Computers(loop, self.network)
-            loop.run(EPOCH + _MAX_DURATION_US, lambda now: self._watch(now, computers))
+    def run(self, taps: Sequence[StepObserver] = ()) -> None:
+        """Fly to the end; ``outcome`` then holds the results. ``taps`` observe the steps of this process.
+
+        Raises OutriderError if another process of the flight fails.
+        """
+        others = schedule(self.scenario, self.target, *self.moving, self.operator)
+        self._team.start()
+        try:
+            self._vehicles.run(others, self._watch, taps, reverse=self._reverse)
+            self._others = self._team.results()
+        finally:
+            self._team.stop()
+
+    @property
+    def cpu_of_others(self) -> float:
+        """CPU time (s) of the other processes of the flight that has ended."""
+        return sum(one.cpu for one in self._others)
 
     @property
     def outcome(self) -> Outcome:
         """Results of the flight."""
-        conductor, now = self.conductor, [c.tally for c in self.companions]
-        counters = self.network.counters
+        conductor = self.conductor
+        parts = [results_of(self._vehicles, 0.0), *self._others]
+        now = [tally for part in parts for tally in part.now]
+        at_start = [tally for part in parts for tally in part.at_start] or now
+        at_end = [tally for part in parts for tally in part.at_end] or now
         return Outcome(
             self.scenario,
             self.seed,
@@ -110,95 +114,55 @@ class Flight:
             conductor.clock_end,
             conductor.converged_at,
             conductor.failure,
-            list(zip(self._tally_at_start or now, self._tally_at_end or now, strict=True)),
-            Messages(counters.sent, counters.dropped, sum(c.bad_frames for c in self.companions)),
-            plan_logs=[c.plan_log for c in self.companions],
+            list(zip(at_start, at_end, strict=True)),
+            Messages(
+                sum(part.counters.sent for part in parts),
+                sum(part.counters.dropped for part in parts),
+                sum(part.bad_frames for part in parts),
+            ),
+            plan_logs=[log for part in parts for log in part.plan_logs],
         )
 
-    def _schedule(self) -> list[Scheduled]:
-        """Return the schedule; each companion has its own phase and clock."""
-        timing = self.scenario.timing
-        nodes = [Scheduled(a, timing.autopilot_us, EPOCH) for a in self.autopilots]
-        for k, (companion, phase) in enumerate(zip(self.companions, self.fleet.phases(), strict=True)):
-            clock = self.fleet.clock(k, EPOCH)
-            nodes.append(Scheduled(companion, timing.companion_us, EPOCH + phase, clock))
-        for k in self.fleet.with_backup:
-            clock = self.fleet.clock(k, EPOCH)
-            nodes.append(Scheduled(self.backup_nodes[k], timing.companion_us, EPOCH, clock))
-        nodes.append(Scheduled(self.target, timing.companion_us, EPOCH))
-        nodes += [Scheduled(moving, timing.companion_us, EPOCH) for moving in self.moving]
-        nodes.append(Scheduled(self.operator, timing.companion_us, EPOCH))
-        return nodes[::-1] if self._reverse else nodes
+    def snapshots(self, now: int) -> list[VehicleSnapshot]:
+        """Return the snapshots of all vehicles at ``now`` (µs), the time of the last sample."""
+        others = [one for report in self._reports for one in report.snapshots]
+        return self._vehicles.snapshots(now) + others
 
-    def _watch(self, now: int, computers: _Computers) -> bool:
+    def change(self, now: int, change: Change) -> None:
+        """Apply ``change`` at ``now`` (µs), the time of the last sample."""
+        self._changes.append(change)
+        if change.target is not None:
+            self.target.move(now, np.array(change.target))
+
+    def _watch(self, now: int) -> bool:
         """Process a tick; return True to end the run."""
-        conductor = self.conductor
-        if conductor.clock_start is not None:
-            while self._events and self._events[0].after <= now - conductor.clock_start:
-                self._strike(self._events.popleft(), computers)
-        if not self._observer.see(now):
+        own, conductor = self._vehicles.see(now), self.conductor
+        if own is None:
             return False
+        self._reports = self._team.reports()
+        parts = [own, *(report.part for report in self._reports)]
+        self._observer.take(now, [part.motions for part in parts])
         start = conductor.clock_start
         self._progress(conductor.stage, (now - (EPOCH if start is None else start)) * 1e-6)
-        over = conductor.see(self._sight(now))
-        if start is None and conductor.clock_start is not None:
-            self._begin(now)
-        if conductor.clock_end is not None and not self._tally_at_end:
-            self._tally_at_end = [c.tally for c in self.companions]
+        positions, velocities, target = self.truth.latest()
+        waiting = tuple(text for part in parts for text in part.waiting)
+        armed = any(part.armed for part in parts)
+        over = conductor.see(Observation(now, positions, velocities, target, not waiting, waiting, armed))
+        begins = start is None and conductor.clock_start is not None
+        if begins:
+            self.target.begin(now)
+            for moving in self.moving:
+                moving.begin(now)
+        instructions = Instructions(begins, conductor.clock_end is not None, over)
+        obey(self._vehicles, now, instructions)
         if self._onlooker is not None:
             self._onlooker(self, now)
+            instructions = instructions._replace(changes=tuple(self._changes))
+            for change in self._changes:
+                self._vehicles.change(change)
+            self._changes.clear()
+        self._team.instruct(instructions)
         return over
-
-    def _begin(self, now: int) -> None:
-        """Process the goal event: record the tallies, and inform target, moving obstacles and autopilots."""
-        self._tally_at_start = [c.tally for c in self.companions]
-        self.target.begin(now)
-        for moving in self.moving:
-            moving.begin(now)
-        for autopilot in self.autopilots:
-            autopilot.begin(now)
-
-    def _sight(self, now: int) -> Observation:
-        positions, velocities, target = self.truth.latest()
-        waiting = [
-            f"{c.name} waits for {c.pilot.waiting_for}" + (f" ({c.pilot.said})" if c.pilot.said else "")
-            for c in self.companions
-            if c.pilot.phase is not Phase.ESCORT
-        ]
-        armed = any(
-            a.armed for s, a in zip(self.systems, self.autopilots, strict=True) if s not in self._vanished
-        )
-        return Observation(now, positions, velocities, target, not waiting, tuple(waiting), armed)
-
-    def _strike(self, event: Event, computers: _Computers) -> None:
-        strike_computer(event, computers)
-        if isinstance(event.what, PartitionPart):
-            return
-        strike_autopilot(event, self.autopilots[self.systems.index(event.what.vehicle)])
-        if isinstance(event.what, Vanish):
-            self._vanished.add(event.what.vehicle)
-
-
-class _Computers:
-    """The companions' computers in lock-step."""
-
-    def __init__(self, loop: LockStep, network: SimulatedNetwork) -> None:
-        self._loop, self._network = loop, network
-
-    def freeze(self, system: int) -> None:
-        self._loop.freeze(names.companion(system))
-
-    def thaw(self, system: int) -> None:
-        self._loop.thaw(names.companion(system))
-
-    def vanish(self, system: int) -> None:
-        self._loop.vanish(names.companion(system))
-
-    def cut(self, systems: tuple[int, ...]) -> None:
-        self._network.cut("swarm", map(names.companion, systems))
-
-    def heal(self, systems: tuple[int, ...]) -> None:
-        self._network.heal("swarm", map(names.companion, systems))
 
 
 def truth_of(scenario: Scenario) -> GroundTruth:

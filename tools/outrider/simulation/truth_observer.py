@@ -1,8 +1,9 @@
-"""Observer that passes the true state of emulated autopilots to the ground truth."""
+"""Observers that pass the true state of emulated autopilots to the ground truth."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,48 +15,67 @@ from outrider.simulation.targets import Placed, Target
 from sitl.node import Autopilot
 
 
-class TruthObserver:
+class Motions(NamedTuple):
+    """Motions of vehicles since the sample before, ENU.
+
+    ``times`` (n,): µs of the physics steps; ``track`` (n, K, 3): positions then, m, NaN while not in the air;
+    ``rows`` (K, ROW): samples at the end.
+    """
+
+    times: list[int]
+    track: Array
+    rows: Array
+
+
+class MotionObserver:
     """Observer of the autopilots of a lock-step run; ``see`` is called after every tick."""
 
-    def __init__(
-        self,
-        autopilots: list[Autopilot],
-        target: Target,
-        truth: GroundTruth,
-        moving: Sequence[MovingObstacle] = (),
-    ) -> None:
+    def __init__(self, autopilots: Sequence[Autopilot]) -> None:
         self._autopilots = autopilots
-        self._target = target
-        self._moving = moving
-        self._truth = truth
         self._last = -1
         self._next = 0
         self._pending: list[list[Array]] = [[] for _ in autopilots]
         self._times: list[int] = []
 
-    def see(self, now: int) -> bool:
-        """Process the physics steps since the last call; return whether a sample was taken at ``now``."""
+    def see(self, now: int) -> Motions | None:
+        """Process the physics steps since the last call; return a sample if one is due at ``now`` (µs)."""
         moved_to = self._autopilots[0].moved_to
         if moved_to == self._last:
-            return False
+            return None
         times = self._autopilots[0].trace_times
         if not len(times):
-            return False
+            return None
         self._last = moved_to
         for autopilot, pending in zip(self._autopilots, self._pending, strict=True):
             trace = autopilot.trace
             pending.append(trace if autopilot.airborne else np.full_like(trace, np.nan))
         self._times += times.tolist()
         if now < self._next:
-            return False
+            return None
         self._next = now + SAMPLE
         track = ned_to_enu(np.stack([np.concatenate(pending) for pending in self._pending], axis=1))
-        moving = moving_places(self._moving, self._times)
-        self._truth.take(now, track, rows(self._autopilots), places(self._target, self._times), moving)
+        motions = Motions(self._times, track, rows(self._autopilots))
         for pending in self._pending:
             pending.clear()
-        self._times.clear()
-        return True
+        self._times = []
+        return motions
+
+
+class TruthObserver:
+    """Observer that passes motions, and those of target and moving obstacles, to the ground ``truth``."""
+
+    def __init__(self, target: Target, truth: GroundTruth, moving: Sequence[MovingObstacle] = ()) -> None:
+        self._target = target
+        self._moving = moving
+        self._truth = truth
+
+    def take(self, now: int, parts: Sequence[Motions]) -> None:
+        """Pass the motions of all vehicles at ``now`` (µs), in ``parts`` in the order of the vehicles."""
+        times = parts[0].times
+        track = np.concatenate([part.track for part in parts], axis=1)
+        samples = np.concatenate([part.rows for part in parts])
+        moving = moving_places(self._moving, times)
+        self._truth.take(now, track, samples, places(self._target, times), moving)
 
 
 def places(target: Placed, times: Iterable[int]) -> Array:

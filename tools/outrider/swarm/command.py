@@ -34,13 +34,14 @@ __all__ = [
 
 
 class Pace(NamedTuple):
-    """Pace of a flight: lock-step, or real time with one process per node.
+    """Pace of a flight: lock-step in so many ``processes``, or real time with one process per node.
 
-    With ``priority`` these processes request real-time priority.
+    With ``priority`` the processes of a flight in real time request real-time priority.
     """
 
     real_time: bool = False
     priority: bool = False
+    processes: int = 1
 
 
 LOCK_STEP = Pace()
@@ -68,7 +69,7 @@ def fly(
         if pace.real_time:
             outcome, cost = _flown_in_real_time(prepared, seed, progress, directory, pace, show)
         else:
-            outcome, cost = _flown(prepared, seed, progress, directory, show)
+            outcome, cost = _flown(prepared, seed, progress, directory, show, pace.processes)
         if show is not None:
             show.orders.write(directory)
         summary = summarise(outcome, cost, directory)
@@ -81,7 +82,12 @@ def fly(
 
 
 def _flown(
-    prepared: Prepared, seed: int, progress: Progress, directory: Path, show: FlightView | None
+    prepared: Prepared,
+    seed: int,
+    progress: Progress,
+    directory: Path,
+    show: FlightView | None,
+    processes: int,
 ) -> tuple[Outcome, Cost]:
     wall, cpu = time.perf_counter(), time.process_time()
     flight = Flight(
@@ -91,9 +97,11 @@ def _flown(
         progress=progress,
         run_directory=directory,
         onlooker=None if show is None else show.lock_step(prepared, seed),
+        processes=processes,
     )
     flight.run()
-    return flight.outcome, Cost(time.perf_counter() - wall, time.process_time() - cpu)
+    spent = time.process_time() - cpu + flight.cpu_of_others
+    return flight.outcome, Cost(time.perf_counter() - wall, spent)
 
 
 def _flown_in_real_time(

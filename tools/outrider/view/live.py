@@ -63,7 +63,8 @@ class LiveSource:
             return self._player.poll(wall)
         found: list[Scene | Snapshot] = []
         for data in self._line.receive():
-            # Received from the process that started this one, over a socket that no other process has.
+            # Sent by the process that started this one, over a socket without a name that only processes of
+            # this flight have.
             sent = pickle.loads(data)
             if isinstance(sent, Begin):
                 self._begin = sent.commands
