@@ -14,6 +14,7 @@ import numpy as np
 import piqp
 
 from companion.errors import ShapeError, SolverError
+from companion.values.compiled import FLOAT, array, kernel
 from companion.values.horizon import Array
 
 
@@ -50,7 +51,7 @@ class QpSolver:
                 f"c, x_l, x_u must have {self.size} entries, not {len(c)}, {len(x_l)}, {len(x_u)}"
             )
         # PIQP would treat a NaN bound as absent and report SOLVED. A NaN in any vector makes the sum NaN.
-        check = float(c @ (x_u - x_l))
+        check = _sum(c, x_l, x_u)
         if self.rows:
             if h_l is None or h_u is None or len(h_l) != self.rows or len(h_u) != self.rows:
                 raise ShapeError(f"h_l and h_u must have {self.rows} entries")
@@ -62,6 +63,15 @@ class QpSolver:
         else:
             self._solver.update(c=c, x_l=x_l, x_u=x_u)
         return np.array(_solved(self._solver).x)
+
+
+@kernel(FLOAT, array(1), array(1), array(1))
+def _sum(c: Array, x_l: Array, x_u: Array) -> float:
+    """Return c·(x_u − x_l), of vectors of one length."""
+    total = 0.0
+    for k in range(len(c)):
+        total += c[k] * (x_u[k] - x_l[k])
+    return total
 
 
 class Optimum(NamedTuple):

@@ -147,9 +147,9 @@ class RelevanceFilter:
         bound with S = P = 0 of one of the places, and those so near horizontally that a vehicle which lands
         at a place might descend onto them.
         """
-        near = np.ones(len(states), dtype=np.bool_)
         if self._use_all:
-            return near
+            return np.ones(len(states), dtype=np.bool_)
+        near = np.empty(len(states), dtype=np.bool_)
         _near(
             np.ascontiguousarray(places),
             states,
@@ -224,7 +224,8 @@ def _near(
             x, y, z = states[j, 0] - places[p, 0], states[j, 1] - places[p, 1], states[j, 2] - places[p, 2]
             flat = min(flat, sqrt(x * x + y * y))
             least = min(least, sqrt(x * x + y * y + z * z))
-        if least <= certain:
+        near[j] = least <= certain
+        if near[j]:
             continue
         x, y, z = states[j, 3], states[j, 4], states[j, 5]
         closing = max_speed + max(sqrt(x * x + y * y + z * z), max_speed)

@@ -142,6 +142,10 @@ class HorizonTable:
         self._lasts = np.zeros(0, dtype=np.int64)
         self._knots = np.zeros((0, 1, 9))
         self._latest: dict[int, Horizon] = {}
+        # The last answer of ``_rows_of``: the same senders, in the same tuple, are asked for again and again.
+        self._asked: Sequence[int] = ()
+        self._rows_when_asked = -1
+        self._answer = np.zeros(0, dtype=np.int64)
         self._fresh: set[int] = set()
 
     def put(self, sender: int, horizon: Horizon) -> None:
@@ -180,11 +184,9 @@ class HorizonTable:
         The mask is true for horizons whose epoch is ``oldest`` (µs) or later; the other rows are undefined.
         """
         rows = self._rows_of(senders)
-        known = np.zeros(len(senders), dtype=np.bool_)
-        positions = np.zeros((len(senders), self._steps, 3))
-        if self._rows:
-            times = np.full(len(senders), start)
-            self._sample(rows, times, oldest, positions, known)
+        known = np.empty(len(senders), dtype=np.bool_)
+        positions = np.empty((len(senders), self._steps, 3))
+        self._sample(rows, np.array([start]), oldest, positions, known)
         return positions, known
 
     def at(self, senders: Sequence[int], times: NDArray[np.int64]) -> Located:
@@ -217,7 +219,11 @@ class HorizonTable:
         """Return the row of each sender (M,); −1 for those without a horizon."""
         if self._fresh:
             self._update_rows()
-        return np.array([self._rows.get(sender, -1) for sender in senders], dtype=np.int64)
+        same = senders is self._asked and isinstance(senders, tuple)
+        if not same or len(self._rows) != self._rows_when_asked:
+            self._answer = np.array([self._rows.get(sender, -1) for sender in senders], dtype=np.int64)
+            self._asked, self._rows_when_asked = senders, len(self._rows)
+        return self._answer
 
     def _sample(
         self,
@@ -227,7 +233,7 @@ class HorizonTable:
         positions: Array,
         known: NDArray[np.bool_],
     ) -> None:
-        """Write positions (M, n, 3), m, of ``rows`` (M,) at ``times`` (M,), µs, and each ``dt`` from then on.
+        """Write positions (M, n, 3), m, of ``rows`` (M,) at ``times`` (M,) or (1,), µs, then one per ``dt``.
 
         ``known`` (M,) becomes true for horizons whose epoch is ``oldest`` (µs) or later.
         """
@@ -267,4 +273,7 @@ def _sample(
         row = rows[j]
         known[j] = row >= 0 and epochs[row] >= oldest
         if row >= 0:
-            _positions_of(knots[row], lasts[row], times[j] - epochs[row], step, dts[row], positions[j])
+            elapsed = times[j % len(times)] - epochs[row]
+            _positions_of(knots[row], lasts[row], elapsed, step, dts[row], positions[j])
+        else:
+            positions[j] = 0.0

@@ -27,7 +27,7 @@ from companion.avoidance.field.jerk import Flown, JerkRows
 from companion.avoidance.solver import QpSolver
 from companion.config.planning import CostConfig, HorizonConfig, LimitsConfig
 from companion.errors import SolverError
-from companion.values.compiled import FLOAT, INT, VOID, array, kernel, output
+from companion.values.compiled import FLOAT, INT, VOID, array, kernel, output, part
 from companion.values.horizon import Array
 from companion.values.prediction import prediction
 
@@ -99,10 +99,8 @@ class Dqmpc:
         n = horizon.steps + 1
         dt = horizon.dt_us * 1e-6
         self.n, self.dt, self.cost, self.limits = n, dt, cost, limits
-        self._horizon_s = n * dt
         self.S_v, self.S_x, _ = prediction(n, dt)
         self.G: Array = np.vstack([self.S_v, self.S_x])
-        self._G_T: Array = np.ascontiguousarray(self.G.T)
         self._jerk = None if limits.j_max is None else JerkRows(n, dt, np.array(limits.j_max))
         self._u_max: Array = np.array(limits.u_max)
         ones = np.ones(n)
@@ -184,66 +182,16 @@ class Dqmpc:
         First the bounds on a are opened for the limits, as late and as little as necessary. A limit that no
         input keeps even then is widened until some inputs keep it, with a small margin.
         """
-        _, x_l, x_u, h_l, h_u, far, flown = problem
-        least, most = -far, far
-        if self._jerk is not None and flown is not None:
-            a_l, a_u = self._jerk.reach(flown)
-            x_l, x_u = np.minimum(np.maximum(x_l, a_l), a_u), np.maximum(np.minimum(x_u, a_u), a_l)
-            least, most = np.minimum(np.maximum(least, a_l), a_u), np.maximum(np.minimum(most, a_u), a_l)
-        least, most = np.minimum(least, x_l), np.maximum(most, x_u)
-        # The state that the plan begins with, recovered from the drift in the rows.
-        v = self._low[:, 0] - h_l[:, 0]
-        x = self._low[:, -1] - h_l[:, -1] - self._horizon_s * v
-        down = np.any(h_l > x_u @ self._G_T + _TOLERANCE, axis=1, keepdims=True)
-        if down.any():
-            late = -self._late(-x_u, -most, x - self._low[:, -1], -v, flown, -1.0)
-            x_u = np.where(down, np.maximum(x_u, late), x_u)
-        up = np.any(x_l @ self._G_T > h_u + _TOLERANCE, axis=1, keepdims=True)
-        if up.any():
-            late = self._late(x_l, least, self._high[:, -1] - x, v, flown, 1.0)
-            x_l = np.where(up, np.minimum(x_l, late), x_l)
-        margin = _WIDEN * ((most - least) @ self._G_T)
-        x_u = x_u + self._opened(h_l - x_u @ self._G_T, most - x_u, margin)
-        x_l = x_l - self._opened(x_l @ self._G_T - h_u, x_l - least, margin)
-        low, high = x_l @ self._G_T, x_u @ self._G_T
-        margin = _WIDEN * (high - low)
-        return problem._replace(
-            x_l=np.minimum(x_l, problem.x_l),
-            x_u=np.maximum(x_u, problem.x_u),
-            h_l=np.minimum(h_l, high - margin),
-            h_u=np.maximum(h_u, low + margin),
+        jerk, step, last = _NO_JERK, self.dt, _NO_JERK
+        least, most = -problem.far, problem.far
+        if self._jerk is not None and problem.flown is not None:
+            jerk, last = self._jerk.j_max, problem.flown.acceleration
+            step = min(problem.flown.elapsed, self.dt)
+            least, most = self._jerk.reach(problem.flown)
+        opened = problem._replace(
+            x_l=problem.x_l.copy(), x_u=problem.x_u.copy(), h_l=problem.h_l.copy(), h_u=problem.h_u.copy()
         )
-
-    def _late(
-        self, pushed: Array, least: Array, room: Array, v: Array, flown: Flown | None, side: float
-    ) -> Array:
-        """Return accelerations (3, n): ``pushed`` (3, n), or less where speed or braking distance require it.
-
-        Positive values point towards one limit of the box on each axis (``side`` 1: the upper, −1: the
-        lower), which is ``room`` (3,) m away and is approached at ``v`` (3,) m/s. Without a bound on jerk the
-        accelerations are not less than ``least`` (3, n); with one, their changes stay within it.
-        """
-        found = np.empty_like(pushed)
-        jerk, step, last = _NO_JERK, self.dt, np.zeros(3)
-        if self._jerk is not None and flown is not None:
-            jerk, step, last = self._jerk.j_max, min(flown.elapsed, self.dt), side * flown.acceleration
-        _late(pushed, least, room, v, self._high[:, 0] - _SLOWER, jerk, self.dt, step, last, found)
-        return found
-
-    def _opened(self, missing: Array, room: Array, margin: Array) -> Array:
-        """Return by how much bounds (3, n) on a give way so that rows (3, 2n) gain what is ``missing`` there.
-
-        They give way within their ``room`` (3, n), by the same share of it at every n. The rows gain a
-        ``margin`` in addition.
-        """
-        # Speed has been treated before: a vehicle that is still too fast cannot be slowed down in time.
-        missing = missing[:, self.n :]
-        if (missing <= _TOLERANCE).all():
-            return np.zeros_like(room)
-        gains = self._G_T[:, self.n :]
-        gain = np.maximum(room @ gains, _TOLERANCE)
-        share = np.where(missing > _TOLERANCE, (missing + margin[:, self.n :]) / gain, 0.0).max(axis=1)
-        opened: Array = np.minimum(share, 1.0)[:, None] * room
+        _open(least, most, problem.far, self._low, self._high, jerk, self.dt, step, last, *opened[1:5])
         return opened
 
     def axis(self, problem: Problem, axis: int, omega_scale: float) -> AxisQp:
@@ -482,45 +430,134 @@ def _gradient(
         gradient[i] = 2.0 * (e_x + ratio_i * last[i] + 0.5 * dt * dt * e_x + ratio_v * dt * e_v)
 
 
-@kernel(VOID, *[array(2)] * 2, *[array(1)] * 4, *[FLOAT] * 2, array(1), output(2))
+@part
+def _rows_of(a: Array, dt: float, rows: Array) -> None:
+    """Write G a (2n,) to ``rows``: velocities and positions by accelerations ``a`` (n,) from rest at 0."""
+    n = len(a)
+    x = v = 0.0
+    for k in range(n):
+        x += dt * (v + 0.5 * dt * a[k])
+        v += dt * a[k]
+        rows[k], rows[n + k] = v, x
+
+
+@part
 def _late(
     pushed: Array,
     least: Array,
-    room: Array,
-    v: Array,
-    fastest: Array,
+    room: float,
+    v: float,
+    fastest: float,
+    jerk: float,
+    dt: float,
+    step: float,
+    last: float,
+    found: Array,
+) -> None:
+    """Write to ``found`` (n,) accelerations as ``pushed`` (n,) until speed or braking distance allow no more.
+
+    They point towards a side that is ``room`` m away, approached at ``v`` m/s; ``fastest`` is the largest
+    speed, m/s. Without a bound on ``jerk``, which is then 0, they are not less than ``least`` (n,). With one
+    they continue the acceleration ``last`` within it; ``step`` (s) is the time for the first change.
+    """
+    n = len(pushed)
+    place = room - _INSIDE
+    strong = -_SPARE * min(least[n - 1], 0.0)
+    lost = dt if jerk == 0.0 else dt + strong / (2.0 * jerk)
+    for k in range(n):
+        stop = sqrt(2.0 * strong * max(place - lost * max(v, 0.0), 0.0))
+        rest = min(fastest, stop) - v
+        # A vehicle that moves away from that side too fast must be slowed down first.
+        a = max(pushed[k], (-fastest - v) / dt)
+        if jerk == 0.0:
+            a = max(min(a, rest / dt), least[k])
+        else:
+            # v + dt a + a²/2j, the speed when a has come back to zero, stays below.
+            if rest > 0.0:
+                a = min(a, jerk * (sqrt(dt * dt + 2.0 * rest / jerk) - dt))
+            else:
+                a = min(a, max(rest / dt, -sqrt(-jerk * rest)))
+            a = min(max(a, last - jerk * step), last + jerk * step)
+            last, step = a, dt
+        found[k] = a
+        place -= dt * (v + 0.5 * dt * a)
+        v += dt * a
+
+
+@part
+def _share_to_open(missing: Array, room: Array, margin: Array, dt: float, gain: Array) -> float:
+    """Return the share (0…1) of its ``room`` (n,) by which a bound on a gives way.
+
+    The positions then gain what is ``missing`` (2n,), and a ``margin`` (2n,) in addition. Speed has been
+    treated before: a vehicle that is still too fast cannot be slowed down in time. ``gain`` (2n,) is scratch
+    memory.
+    """
+    n, share = len(room), 0.0
+    _rows_of(room, dt, gain)
+    for k in range(n, 2 * n):
+        if missing[k] > _TOLERANCE:
+            share = max(share, (missing[k] + margin[k]) / max(gain[k], _TOLERANCE))
+    return min(share, 1.0)
+
+
+@kernel(VOID, *[array(2)] * 5, array(1), *[FLOAT] * 2, array(1), *[output(2)] * 4)
+def _open(
+    reach_l: Array,
+    reach_u: Array,
+    far: Array,
+    lowest: Array,
+    highest: Array,
     j_max: Array,
     dt: float,
     step: float,
-    last: Array,
-    found: Array,
+    flown: Array,
+    x_l: Array,
+    x_u: Array,
+    h_l: Array,
+    h_u: Array,
 ) -> None:
-    """Write ``Dqmpc._late`` to ``found`` (3, n).
+    """Open the bounds of ``Problem`` in place as ``Dqmpc.reachable`` describes.
 
-    ``fastest`` (3,) is the largest speed, m/s; ``j_max`` (3,) is 0 without a bound on jerk, otherwise the
-    plan continues from the acceleration ``last`` (3,) and has ``step`` (s) for its first change.
+    ``reach_l``, ``reach_u`` (3, n): accelerations that a bound on jerk allows; without one ``j_max`` (3,) is
+    0. ``lowest``, ``highest`` (3, 2n): limits of velocities and positions. ``flown`` (3,): the acceleration
+    that the plan continues, with ``step`` (s) for its first change.
     """
-    n = pushed.shape[1]
+    n = far.shape[1]
+    low, high, least, most = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    rows, gain, margin, late = np.empty(2 * n), np.empty(2 * n), np.empty(2 * n), np.empty(n)
     for i in range(3):
-        jerk, flown, allowed = j_max[i], last[i], step
-        place, speed = room[i] - _INSIDE, v[i]
-        strong = -_SPARE * min(least[i, n - 1], 0.0)
-        lost = dt if jerk == 0.0 else dt + strong / (2.0 * jerk)
         for k in range(n):
-            stop = sqrt(2.0 * strong * max(place - lost * max(speed, 0.0), 0.0))
-            rest = min(fastest[i], stop) - speed
-            # A vehicle that moves away from that side too fast must be slowed down first.
-            a = max(pushed[i, k], (-fastest[i] - speed) / dt)
-            if jerk == 0.0:
-                a = max(min(a, rest / dt), least[i, k])
-            else:
-                # The speed when a has come back to zero, v + dt a + a²/(2 jerk), stays below the limit.
-                if rest > 0.0:
-                    a = min(a, jerk * (sqrt(dt * dt + 2.0 * rest / jerk) - dt))
-                else:
-                    a = min(a, max(rest / dt, -sqrt(-jerk * rest)))
-                a = min(max(a, flown - jerk * allowed), flown + jerk * allowed)
-                flown, allowed = a, dt
-            found[i, k] = a
-            place -= dt * (speed + 0.5 * dt * a)
-            speed += dt * a
+            low[k] = min(max(x_l[i, k], reach_l[i, k]), reach_u[i, k])
+            high[k] = max(min(x_u[i, k], reach_u[i, k]), reach_l[i, k])
+            least[k] = min(min(max(-far[i, k], reach_l[i, k]), reach_u[i, k]), low[k])
+            most[k] = max(max(min(far[i, k], reach_u[i, k]), reach_l[i, k]), high[k])
+        # The state that the plan begins with, recovered from the drift in the rows.
+        v = lowest[i, 0] - h_l[i, 0]
+        x = lowest[i, 2 * n - 1] - h_l[i, 2 * n - 1] - n * dt * v
+        fastest = highest[i, 0] - _SLOWER
+        _rows_of(high, dt, rows)
+        if (h_l[i] > rows + _TOLERANCE).any():
+            _late(-high, -most, x - lowest[i, 2 * n - 1], -v, fastest, j_max[i], dt, step, -flown[i], late)
+            for k in range(n):
+                high[k] = max(high[k], -late[k])
+        _rows_of(low, dt, rows)
+        if (rows > h_u[i] + _TOLERANCE).any():
+            _late(low, least, highest[i, 2 * n - 1] - x, v, fastest, j_max[i], dt, step, flown[i], late)
+            for k in range(n):
+                low[k] = min(low[k], late[k])
+        _rows_of(most - least, dt, margin)
+        margin *= _WIDEN
+        _rows_of(high, dt, rows)
+        high += _share_to_open(h_l[i] - rows, most - high, margin, dt, gain) * (most - high)
+        _rows_of(low, dt, rows)
+        low -= _share_to_open(rows - h_u[i], low - least, margin, dt, gain) * (low - least)
+        # A limit that cannot be kept even so is widened to slightly beyond what is reachable.
+        _rows_of(low, dt, rows)
+        _rows_of(high, dt, gain)
+        for k in range(2 * n):
+            spare = _WIDEN * (gain[k] - rows[k])
+            h_l[i, k] = min(h_l[i, k], gain[k] - spare)
+            h_u[i, k] = max(h_u[i, k], rows[k] + spare)
+        for k in range(n):
+            x_l[i, k] = min(low[k], x_l[i, k])
+            x_u[i, k] = max(high[k], x_u[i, k])

@@ -152,7 +152,8 @@ class Planner:
         influence = Influence(field, 1.0, scene.destination)
         for method in self._methods:
             influence = method.influence(scene, influence)
-        return influence._replace(force=self._smoothed(elapsed, influence.force))
+        force = self._smoothed(elapsed, influence.force)
+        return Influence(force, influence.omega_scale, influence.destination)
 
     def _smoothed(self, elapsed: float, force: Array) -> Array:
         """Return the field limited to a_total, and smoothed in time.

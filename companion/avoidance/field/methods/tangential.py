@@ -111,7 +111,7 @@ class Tangential:
             config.pass_speed,
             force,
         )
-        return influence._replace(force=force, omega_scale=config.omega_scale) if acts else influence
+        return Influence(force, config.omega_scale, influence.destination) if acts else influence
 
     def _release(self, obstacles: Obstacles, weight: Array) -> None:
         if not self._sense:
