@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -100,6 +100,14 @@ def show_bench(figures: Mapping[str, object]) -> None:
     table = Table(title="outrider bench", show_header=False)
     for key, value in figures.items():
         table.add_row(key, _text(value))
+    Console().print(table)
+
+
+def show_ratios(rows: Sequence[tuple[str, float, float, float]]) -> None:
+    """Show figures of an earlier benchmark beside the present ones: name, before, now and ratio."""
+    table = Table("figure", "before", "now", "ratio", title="compared")
+    for name, before, now, ratio in rows:
+        table.add_row(name, f"{before:g}", f"{now:g}", f"{ratio:.2f}")
     Console().print(table)
 
 

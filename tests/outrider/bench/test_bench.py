@@ -1,0 +1,44 @@
+"""The benchmark's stages and its comparison with an earlier one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from outrider.bench import stages
+from outrider.bench.comparison import earlier, ratios
+from outrider.errors import InputError
+
+
+def test_every_stage_is_timed_and_left_as_it_was() -> None:
+    every = [*stages.FIELD.values(), *stages.CERTIFIED.values()]
+    before = {(owner, name): getattr(owner, name) for owner, name in every}
+    found = stages.measured()
+    assert set(found["field"]) == set(stages.FIELD)
+    assert set(found["certified"]) == set(stages.CERTIFIED)
+    assert all(value > 0.0 for part in found.values() for value in part.values())
+    assert before == {(owner, name): getattr(owner, name) for owner, name in before}
+
+
+def test_figures_of_both_benchmarks_are_compared(tmp_path: Path) -> None:
+    before = {"plan_step_ms": {"field": {"p50": 0.4}}, "gone": 1.0, "nothing": 0, "machine": "one"}
+    now = {"plan_step_ms": {"field": {"p50": 0.1}}, "new": 1.0, "nothing": 3, "machine": "one"}
+    path = tmp_path / "bench.json"
+    path.write_text(json.dumps(before))
+    (one,) = ratios(earlier(path), now)
+    assert (one.name, one.before, one.now, one.ratio) == ("plan_step_ms.field.p50", 0.4, 0.1, 0.25)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", "\x00", '{"plan_step": 1}'])
+def test_a_file_that_is_no_benchmark_is_refused(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "bench.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match="is no benchmark; allowed: the output of outrider bench --json"):
+        earlier(path)
+
+
+def test_a_file_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        earlier(tmp_path / "none.json")
