@@ -109,7 +109,7 @@ def _changes(before: LimitsConfig, after: LimitsConfig, able: Limits) -> Iterato
     climb = "climb" if able.climb < able.sink else "sink"
     jerks = before.j_max or (inf, inf, inf), after.j_max or (inf, inf, inf)
     for name, unit, was, is_now, limit in (
-        ("j_max", "m/s³", min(jerks[0][:2]), min(jerks[1][:2]), "jerk"),
+        ("j_max", "m/s³", max(jerks[0][:2]), max(jerks[1][:2]), "jerk"),
         ("a_total", "m/s²", before.a_total, after.a_total, "tilt"),
         ("u_max", "m/s²", max(before.u_max[:2]), max(after.u_max[:2]), push),
         ("u_max up", "m/s²", before.u_max[2], after.u_max[2], "tilt"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from companion.config.planning import LimitsConfig
@@ -57,6 +57,10 @@ def test_stock_firmware_follows_the_shipped_files(flavour, received):
 
 
 @given(vehicle=vehicles(), asked=limits())
+@example(
+    vehicle=(ARDUPILOT, {}),
+    asked=LimitsConfig(u_max=(1.0,) * 3, v_max=(1.0,) * 3, a_total=1.0, j_max=(1.0, 4.0, 1.0)),
+)
 def test_plans_stay_within_configuration_and_autopilot(vehicle, asked):
     profile, parameters = vehicle
     able = limits_of(profile.autopilot, parameters)

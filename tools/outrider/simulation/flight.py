@@ -38,8 +38,8 @@ class Flight:
     ``progress`` is called with the stage and the simulated seconds since the goal event, or before it since
     the beginning. Each vehicle's tlog is written to the ``run_directory``, if there is one. ``stopwatch``
     (ns) measures planning. ``reverse_nodes`` reverses the order in which nodes step. The ``onlooker`` may
-    read ``snapshots`` and ``change`` the flight. ``companions`` and ``autopilots`` are those of this process.
-    The result does not depend on the number of processes, to the bit.
+    read ``snapshots`` and ``change`` the flight. ``companions``, ``autopilots`` and ``backup_nodes`` are
+    those of this process. The result does not depend on the number of processes, to the bit.
     """
 
     def __init__(
@@ -65,6 +65,7 @@ class Flight:
         self._vehicles = Vehicles(fleet, share, stopwatch, run_directory, self._team.exchange)
         self.autopilots = self._vehicles.autopilots
         self.companions = self._vehicles.companions
+        self.backup_nodes = list(self._vehicles.backup_nodes.values())
         self.network = self._vehicles.network
         self.operator = fleet.operator()
         self.truth = truth_of(scenario)
