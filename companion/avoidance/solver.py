@@ -65,6 +65,37 @@ class QpSolver:
         return np.array(_solved(self._solver).x)
 
 
+class EquationSolver:
+    """Solver of min ½ yᵀPy + cᵀy subject to Ay = b, with ``size`` variables and ``rows`` equations.
+
+    All matrices differ each time; they are not validated.
+    """
+
+    def __init__(self, size: int, rows: int) -> None:
+        self._rows = rows
+        self._solver = _dense_solver(60, 1e-10, (1e-10, 1e-12))
+        # Without inequalities the system stays well conditioned: with less regularisation than usual one
+        # iteration suffices, and errors are 3e-9 at most instead of 1e-8.
+        self._solver.settings.rho_init = self._solver.settings.delta_init = 1e-8
+        P, c = np.eye(size, order="F"), np.zeros(size)
+        if rows:
+            self._solver.setup(P, c, np.eye(rows, size, order="F"), np.zeros(rows))
+        else:
+            self._solver.setup(P, c)
+
+    def solve(self, P: Array, c: Array, A: Array, b: Array) -> Any:
+        """Return PIQP's result: ``x`` (size,) and the multipliers ``y`` (rows,), overwritten by the next.
+
+        P (size, size) and A (rows, size) are stored column by column. Raises SolverError when PIQP does not
+        report SOLVED.
+        """
+        if self._rows:
+            self._solver.update(P=P, c=c, A=A, b=b)
+        else:
+            self._solver.update(P=P, c=c)
+        return _solved(self._solver)
+
+
 @kernel(FLOAT, array(1), array(1), array(1))
 def _sum(c: Array, x_l: Array, x_u: Array) -> float:
     """Return c·(x_u − x_l), of vectors of one length."""

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.avoidance.solver import QpSolver
+from companion.avoidance.reduced_qp import ReducedQp, Vectors
 from companion.config.planning import HeadingConfig, HorizonConfig
 from companion.errors import SolverError
-from companion.values.compiled import FLOAT, array, kernel, output
+from companion.values.compiled import FLOAT, VOID, array, kernel, output
 from companion.values.horizon import Array
 from companion.values.prediction import prediction
 
@@ -39,12 +39,11 @@ class Heading:
         # Yaw is slow: longer steps than the path's suffice.
         n, dt = (horizon.steps + 1) // _STRIDE, _STRIDE * horizon.dt_us * 1e-6
         self._config, self._dt, self._n = config, dt, n
-        self._S_v, self._S_x, self._ahead = prediction(n, dt)
+        self._S_v, self._S_x, _ = prediction(n, dt)
         P: Array = 2.0 * (self._S_x.T @ self._S_x + config.effort * np.eye(n))
-        self._minimiser: Array = -np.asarray(np.linalg.inv(P), dtype=np.float64)
-        self._bounded, self._limited = QpSolver(P), QpSolver(P, self._S_v)
-        self._limit: Array = np.full(n, config.acceleration_max)
-        self._max_rate_change = config.acceleration_max * float(self._ahead[-1])
+        self._qp = ReducedQp(P, self._S_v, 1)
+        self._highest: Array = np.full((1, n), config.acceleration_max)
+        self._lowest: Array = -self._highest
         self._start: int | None = None
         self._state = Yaw(0.0, 0.0, 0.0)
         self._accelerations: Array = np.zeros(n)
@@ -60,23 +59,24 @@ class Heading:
         Both are given at n = 1…N + 1. If the QP has no solution, the last yaw plan is kept.
         """
         state = self.at(now)
-        c, free = np.empty(self._n), np.empty(self._n)
-        largest = _yaw_vectors(
+        vectors = np.empty((3, 1, self._n))
+        _yaw_vectors(
             state.yaw,
             state.rate,
             np.ascontiguousarray(positions),
             np.ascontiguousarray(targets),
             self._config.blind,
+            self._config.rate_max,
             self._dt,
             self._S_x,
-            self._minimiser,
-            c,
-            free,
+            vectors,
         )
+        c, slowest, fastest = vectors
         try:
-            self._accelerations = self._solve(c, free, largest, state.rate)
+            solved = self._qp.solve(Vectors(c, self._lowest, self._highest, slowest, fastest))
         except SolverError:
             return
+        self._accelerations = solved[0]
         self._start, self._state = now, state
 
     def at(self, time: int) -> Yaw:
@@ -96,40 +96,27 @@ class Heading:
         acceleration = float(a[index])
         return Yaw(yaw + s * rate + 0.5 * s * s * acceleration, rate + s * acceleration, acceleration)
 
-    def _solve(self, c: Array, free: Array, largest: float, rate: float) -> Array:
-        """Return the ``free`` minimiser (n,) where it surely keeps all bounds, else PIQP's solution.
 
-        ``largest`` is its largest absolute acceleration, rad/s².
-        """
-        limit, bound = self._limit, self._config.rate_max
-        if largest <= limit[0] and abs(rate) + largest * float(self._ahead[-1]) <= bound:
-            return free
-        if abs(rate) + self._max_rate_change <= bound:
-            return self._bounded.solve(c, -limit, limit)
-        # A present rate above the bound must be allowed, otherwise there is no solution.
-        rows = np.full(self._n, max(bound, abs(rate)))
-        return self._limited.solve(c, -limit, limit, -rows - rate, rows - rate)
-
-
-@kernel(FLOAT, FLOAT, FLOAT, array(2), array(2), FLOAT, FLOAT, array(2), array(2), output(1), output(1))
+@kernel(VOID, *[FLOAT] * 2, *[array(2)] * 2, *[FLOAT] * 3, array(2), output(3))
 def _yaw_vectors(
     yaw: float,
     rate: float,
     positions: Array,
     targets: Array,
     blind: float,
+    rate_max: float,
     dt: float,
     S_x: Array,
-    minimiser: Array,
-    c: Array,
-    free: Array,
-) -> float:
-    """Write c (n,) of the QP and its free minimiser (n,), −P⁻¹c; return the largest absolute entry of that.
+    vectors: Array,
+) -> None:
+    """Write ``vectors`` (3, 1, n) of the QP: c, and the bounds of the change of the rate in each step.
 
     The bearings of the ``targets`` from the ``positions`` have no jumps of 2π, and begin with the turn
     nearest to ``yaw``.
     """
-    n = len(c)
+    c, n = vectors[0, 0], S_x.shape[0]
+    # A present rate above the bound must be allowed, otherwise there is no solution.
+    fastest = max(rate_max, abs(rate))
     missing = np.empty(n)
     before = wanted = yaw
     for k in range(n):
@@ -145,11 +132,4 @@ def _yaw_vectors(
         c[k] = 0.0
         for row in range(n):
             c[k] += S_x[row, k] * missing[row]
-    largest = 0.0
-    for k in range(n):
-        free[k] = 0.0
-        for m in range(n):
-            free[k] += minimiser[k, m] * c[m]
-        if not abs(free[k]) <= largest:
-            largest = abs(free[k])
-    return largest
+        vectors[1, 0, k], vectors[2, 0, k] = -fastest - rate, fastest - rate
