@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.avoidance.solver import EquationSolver, QpSolver
+from companion.avoidance.solver import EquationSolver, QpSolver, equation_solver
 from companion.avoidance.working_set import verified, working_sets
 from companion.errors import SolverError
 from companion.values.horizon import Array
@@ -148,7 +148,7 @@ class ReducedQp:
             for i in range(len(c))
         ]
         # P is symmetric: its rows are its columns.
-        return _Reduced(EquationSolver(size, held), [(P.T, c, A, b) for P, c, A, b in views])
+        return _Reduced(equation_solver(size, held), [(P.T, c, A, b) for P, c, A, b in views])
 
 
 def _bits(which: Sequence[int]) -> int:

@@ -8,6 +8,7 @@ results are copied because the next solve overwrites them.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,6 +66,9 @@ class QpSolver:
         return np.array(_solved(self._solver).x)
 
 
+_NONE = np.zeros(0)
+
+
 class EquationSolver:
     """Solver of min ½ yᵀPy + cᵀy subject to Ay = b, with ``size`` variables and ``rows`` equations.
 
@@ -83,7 +87,7 @@ class EquationSolver:
         else:
             self._solver.setup(P, c)
 
-    def solve(self, P: Array, c: Array, A: Array, b: Array) -> Any:
+    def solve(self, P: Array, c: Array, A: Array = _NONE, b: Array = _NONE) -> Any:
         """Return PIQP's result: ``x`` (size,) and the multipliers ``y`` (rows,), overwritten by the next.
 
         P (size, size) and A (rows, size) are stored column by column. Raises SolverError when PIQP does not
@@ -94,6 +98,12 @@ class EquationSolver:
         else:
             self._solver.update(P=P, c=c)
         return _solved(self._solver)
+
+
+@cache
+def equation_solver(size: int, rows: int) -> EquationSolver:
+    """Return the process's solver of this size: PIQP keeps nothing from one solve to the next."""
+    return EquationSolver(size, rows)
 
 
 @kernel(FLOAT, array(1), array(1), array(1))

@@ -6,9 +6,10 @@ and adds the field to the acceleration. Here every step is weighted, and the fie
 follow a lasting push with its accelerations. The plan ends at rest.
 
 Bounds of acceleration are bounds on variables. Limits of speed and position and the planes are rows Ga ≥ low.
-A row is a candidate if the committed plan is within ``_NEAR`` of it, or if the best plan without rows or an
-earlier solution violates it. The QP holds the candidates that bind, or all candidates if ``binding_rows``
-finds no solution. Its solution is checked against all rows, and the next QP holds the rows that it violates.
+``active_set`` finds what binds, about ten of seven hundred. PIQP solves the QP with that in its dual form:
+with as many variables as bind, the multipliers. Its solution is checked against all rows and bounds. Where it
+violates one, or no active set is found, PIQP solves in the accelerations, with the rows that matter: those
+within ``_NEAR`` of the committed plan, or violated by the best plan without rows or by an earlier solution.
 A limit that the committed plan violates is relaxed until the plan satisfies it, so that this plan is feasible
 in every problem.
 """
@@ -18,12 +19,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from companion.avoidance.certified.active_set import binding_rows
-from companion.avoidance.certified.rows import row_bounds, row_columns, row_slacks
+from companion.avoidance.certified.qp_vectors import row_bounds, write_cost, write_start
+from companion.avoidance.certified.rows import (
+    active_set,
+    combine,
+    relax_limits,
+    row_slacks,
+    write_rows,
+)
 from companion.avoidance.certified.separating_planes import Planes
-from companion.avoidance.solver import solve_once
+from companion.avoidance.solver import equation_solver, solve_once
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import LimitsConfig
 from companion.errors import SolverError
@@ -37,6 +43,10 @@ _KINDS = 18
 """Number of rows of the limits in each step: speed, second and third control point, three axes, both ways."""
 _TOLERANCE = 1e-5
 """Largest violation of a row (m, m/s) that is accepted; much smaller than the planes' margin."""
+_BOUND = 1e-7
+"""Largest violation of a bound of acceleration or row (m, m/s, m/s²) of a dual solution that is accepted."""
+_MOST_BINDING = 64
+"""Largest number of rows and bounds of a QP in its dual form."""
 _ROUNDED = 0.01
 """Tightening of the acceleration bounds (m/s²).
 
@@ -94,10 +104,8 @@ class SeparationQp:
         S_v, self._S_x, _ = prediction(n, dt)
         self.dt, self.S_v = dt, np.ascontiguousarray(S_v)
         v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self.S_v, self._S_x))
-        # ``maps[b] @ a``: what the accelerations a add to control point b of each segment, (3, n, n);
-        # ``_times``: the times (s) of the control points since the beginning, (n, 3).
+        # ``maps[b] @ a``: what the accelerations a add to control point b of each segment, (3, n, n).
         self.maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x])
-        self._times: Array = dt * (np.arange(n)[:, None] + np.array([0.0, 0.5, 1.0]))
         self._weights = np.full(n, config.omega_place)
         self._weights[-1] = config.omega_end
         # ``change @ a``: a_k − a_{k−1}; for k = 0, ``_cost`` subtracts the acceleration flown until then.
@@ -110,18 +118,23 @@ class SeparationQp:
         )
         self._P = np.asfortranarray(np.kron(np.eye(3), one))
         self._A = np.asfortranarray(np.kron(np.eye(3), self.S_v[-1:]))
-        # Inverse of the optimality conditions without rows and bounds: the best plan is then one product.
-        conditions = np.block([[self._P, self._A.T], [self._A, np.zeros((3, 3))]])
+        # Inverse of the optimality conditions of an axis without rows and bounds: from −c, and from −v.
+        conditions = np.block([[one, self.S_v[-1:].T], [self.S_v[-1:], np.zeros((1, 1))]])
         inverse = np.linalg.inv(conditions)
-        self._without_rows: Array = inverse[: 3 * n]
-        self._inverse: Array = np.ascontiguousarray(inverse[: 3 * n, : 3 * n])
+        self._inverse: Array = np.ascontiguousarray(inverse[:n, :n])
+        self._stopping: Array = np.ascontiguousarray(inverse[:n, n])
+        # Memory of ``active_set``.
+        most = _MOST_BINDING
+        self._active = np.zeros(most, np.int64)
+        self._images, self._gram = np.zeros((most, 3, n)), np.zeros((most, most))
+        self._missing = np.zeros(most)
         self.gradient_per_metre = 2.0 * float(self._weights.sum())
         """Derivative of the cost by a shift of the whole plan, one metre from all its preferred places."""
         a_max = np.array(limits.u_max) - _ROUNDED
         if planar:
             # The heights stay almost constant: an interior-point method needs an interior.
             a_max[2] = _ROUNDED
-        self._a_max = np.repeat(a_max, n)
+        self._a_max = np.repeat(a_max[:, None], n, axis=1)
         v_max, low, high = (
             np.repeat(np.array(bound, dtype=np.float64), n)
             for bound in (limits.v_max, limits.box_min, limits.box_max)
@@ -135,86 +148,134 @@ class SeparationQp:
         Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs or although
         the QP holds them.
         """
-        c = self._cost(state, objective)
-        rows = _Rows(self, state, planes)
-        flown = state.committed.T.ravel()
-        a_max = np.maximum(self._a_max, flown)
-        a_min = np.minimum(-self._a_max, flown)
-        best = self._without_rows @ np.concatenate([-c, -state.velocity])
-        clipped = np.minimum(np.maximum(best, a_min), a_max).reshape(3, self.n).T
-        candidates = (rows.values(state.committed) < _NEAR) | (rows.values(clipped) < 0.0)
-        # A row that does not quite bind may be broken by the solver's error: then the solver gets it, too.
-        given = np.zeros(len(candidates), dtype=np.bool_)
-        for count in range(1, _ROUNDS + 1):
-            chosen = np.flatnonzero(candidates)
-            G_T, low = rows.chosen(chosen)
-            binding = np.empty(3 * self.n, np.int64)
-            found_rows = binding_rows(self._inverse, best, G_T, low, a_min, a_max, binding)
-            if found_rows >= 0:
-                binding = np.union1d(binding[:found_rows], np.flatnonzero(given[chosen]))
-                chosen, G_T, low = chosen[binding], G_T[:, binding], low[binding]
-            found = solve_once(self._P, c, self._A, -state.velocity, G_T.T, low, a_min, a_max)
-            a: Array = found.x.reshape(3, self.n).T
-            broken = rows.values(a) < -_TOLERANCE
-            if not broken.any():
-                return Answer(a, rows.plane_multipliers(chosen, found.multipliers), count)
-            if not (broken & ~given).any():
-                break
-            candidates |= broken
-            given |= broken
-        raise SolverError("rows are broken", count)
-
-    def _cost(self, state: State, objective: Objective) -> Array:
-        """Return c (3n,)."""
-        config = self._config
-        ends = state.position + self._times[:, 2, None] * state.velocity
-        flown = np.zeros_like(objective.field)
-        flown[0] = state.before
-        deviation = self._weights[:, None] * (ends - objective.places) - config.omega_field * objective.field
-        c: Array = 2.0 * (
-            self._S_x.T @ deviation
-            + config.omega_speed * self.S_v.T @ (state.velocity - objective.velocities)
-            - config.omega_jerk * flown
-        )
-        return c.T.ravel()
-
-
-class _Rows:
-    """All rows of one problem: first those of the limits, then those of the planes.
-
-    Rows are written out only where they are candidates.
-    """
-
-    def __init__(self, program: SeparationQp, state: State, planes: Planes) -> None:
-        self._program, self._normals = program, planes.normals
-        self._split = _KINDS * program.n
-        self._low: Array = np.empty(self._split + planes.normals.size)
-        row_bounds(
+        config, n = self._config, self.n
+        c, start = np.empty((3, n)), np.empty((3, n))
+        weights = config.omega_speed, config.omega_field, config.omega_jerk
+        places, velocities, field = map(np.ascontiguousarray, objective)
+        write_cost(
             state.position,
             state.velocity,
-            program.dt,
-            program.limits_low,
-            self._normals,
-            planes.wanted,
-            self._low,
+            state.before,
+            places,
+            velocities,
+            field,
+            self._weights,
+            *weights,
+            self._S_x,
+            self.S_v,
+            self.dt,
+            c,
+        )
+        write_start(c, state.velocity, self._inverse, self._stopping, start)
+        flown = np.ascontiguousarray(state.committed.T)
+        low = np.empty(_KINDS * n + planes.normals.size)
+        row_bounds(
+            state.position, state.velocity, self.dt, self.limits_low, planes.normals, planes.wanted, low
         )
         # The planes are made so that the committed plan keeps them.
-        self._low[: self._split] -= np.maximum(-self.values(state.committed)[: self._split], 0.0)
+        relax_limits(flown, self.dt, low)
+        bounds = np.minimum(-self._a_max, flown), np.maximum(self._a_max, flown)
+        problem = _Problem(c, start, flown, state.velocity, planes.normals, low, *bounds)
+        return self._by_active_set(problem) or self._by_rows(problem)
 
-    def values(self, a: Array) -> Array:
-        """Return the slack G a − low of each row, negative if violated; ``a`` (n, 3), m/s²."""
-        slack = np.empty(len(self._low))
-        row_slacks(np.ascontiguousarray(a), self._program.dt, self._normals, self._low, slack)
+    def _by_active_set(self, problem: _Problem) -> Answer | None:
+        """Return the solution of what binds; None if there is none, or if it violates a row or bound."""
+        count = active_set(
+            self._inverse,
+            problem.start,
+            self.dt,
+            self.S_v,
+            self.maps,
+            problem.normals,
+            problem.low,
+            problem.a_min,
+            problem.a_max,
+            self._active,
+            self._images,
+            self._gram,
+            self._missing,
+        )
+        if count < 0:
+            return None
+        try:
+            multipliers = self._multipliers(count)
+        except SolverError:
+            return None
+        a, of_rows = np.empty((3, self.n)), np.zeros(len(problem.low))
+        violation = combine(
+            problem.start,
+            self._images,
+            multipliers,
+            self._active,
+            self.dt,
+            problem.normals,
+            problem.low,
+            problem.a_min,
+            problem.a_max,
+            a,
+            of_rows,
+        )
+        if not violation <= _BOUND:
+            return None
+        return Answer(a.T, self._of_planes(problem, of_rows), 1)
+
+    def _multipliers(self, count: int) -> Array:
+        """Return the multipliers (count,) of the active set, by PIQP; raises SolverError without a result."""
+        if count == 0:
+            return np.zeros(0)
+        gram = np.asfortranarray(self._gram[:count, :count])
+        result: Array = equation_solver(count, 0).solve(gram, -self._missing[:count]).x
+        return result
+
+    def _by_rows(self, problem: _Problem) -> Answer:
+        """Return PIQP's solution in the accelerations, with the rows that matter.
+
+        Raises SolverError as ``solve`` describes.
+        """
+        best = np.minimum(np.maximum(problem.start, problem.a_min), problem.a_max)
+        candidates = self._slacks(problem, problem.flown) < _NEAR
+        candidates |= self._slacks(problem, best) < 0.0
+        a_min, a_max = problem.a_min.ravel(), problem.a_max.ravel()
+        for count in range(1, _ROUNDS + 1):
+            chosen = np.flatnonzero(candidates)
+            G = np.empty((len(chosen), 3, self.n))
+            write_rows(chosen, self.S_v, self.maps, problem.normals, G)
+            rows = G.reshape(len(chosen), 3 * self.n), problem.low[chosen]
+            found = solve_once(self._P, problem.c.ravel(), self._A, -problem.velocity, *rows, a_min, a_max)
+            a: Array = found.x.reshape(3, self.n)
+            broken = self._slacks(problem, a) < -_TOLERANCE
+            if not broken.any():
+                of_rows = np.zeros(len(candidates))
+                of_rows[chosen] = found.multipliers
+                return Answer(a.T, self._of_planes(problem, of_rows), count)
+            if not (broken & ~candidates).any():
+                break
+            candidates |= broken
+        raise SolverError("rows are broken", count)
+
+    def _slacks(self, problem: _Problem, a: Array) -> Array:
+        """Return the slack G a − low of each row, negative if violated; ``a`` (3, n), m/s²."""
+        slack = np.empty(len(problem.low))
+        row_slacks(a, self.dt, problem.normals, problem.low, slack)
         return slack
 
-    def chosen(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Return Gᵀ (3n, R) and low (R,) of the given ``rows`` (R,)."""
-        G_T = np.zeros((3 * self._program.n, len(rows)))
-        row_columns(rows, self._program.S_v, self._program.maps, self._normals, G_T)
-        return G_T, self._low[rows]
+    def _of_planes(self, problem: _Problem, of_rows: Array) -> Array:
+        """Return the multipliers (M, n, 3) of the planes' rows, of those ``of_rows`` (R,)."""
+        return of_rows[_KINDS * self.n :].reshape(*problem.normals.shape[:2], 3)
 
-    def plane_multipliers(self, rows: NDArray[np.intp], multipliers: Array) -> Array:
-        """Return the multipliers (M, n, 3) of the planes' rows from those of the given ``rows`` (R,)."""
-        every = np.zeros(len(self._low))
-        every[rows] = multipliers
-        return every[self._split :].reshape(*self._normals.shape[:2], 3)
+
+class _Problem(NamedTuple):
+    """One problem, by axis: c, the best plan without inequalities, and the committed accelerations, (3, n).
+
+    ``velocity`` (3,); normals (M, n, 3) of the planes; ``low`` (R,) of the rows: first those of the limits,
+    then those of the planes; bounds of the accelerations, (3, n).
+    """
+
+    c: Array
+    start: Array
+    flown: Array
+    velocity: Array
+    normals: Array
+    low: Array
+    a_min: Array
+    a_max: Array

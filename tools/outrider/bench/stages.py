@@ -38,8 +38,8 @@ FIELD: Mapping[str, Stage] = {
 CERTIFIED: Mapping[str, Stage] = {
     "planes": (commitment, "planes"),
     "QP": (SeparationQp, "solve"),
-    "binding rows": (qp, "binding_rows"),
-    "PIQP": (qp, "solve_once"),
+    "binding rows": (qp, "active_set"),
+    "PIQP": (SeparationQp, "_multipliers"),
     "yaw": (Heading, "plan"),
     "set-point": (certified, "setpoint"),
 }

@@ -1,49 +1,139 @@
-"""Rows that bind: the QP with these rows alone has the minimiser of the QP with all rows."""
+"""What binds: the QP with these rows and bounds as equations has the minimiser of the QP with all of them."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import daqp
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from companion.avoidance.certified.active_set import binding_rows
-from companion.avoidance.solver import solve_once
-from companion.errors import SolverError
+from companion.avoidance.certified.qp_vectors import row_bounds
+from companion.avoidance.certified.rows import active_set, combine, write_rows
+from companion.values.horizon import Array
+from companion.values.prediction import prediction
 
+DT, MOST = 0.1, 64
 seeds = st.integers(0, 2**32 - 1)
 
 
-@given(seeds)
-def test_the_binding_rows_determine_the_minimiser(seed: int) -> None:
-    """All QPs have a point inside: the minimiser exists, and is unique."""
+class Qp(NamedTuple):
+    """QP of n accelerations per axis, by axis; every one has a point inside."""
+
+    one: Array
+    c: Array
+    S_v: Array
+    maps: Array
+    normals: Array
+    low: Array
+    x_min: Array
+    x_max: Array
+
+    @property
+    def start(self) -> Array:
+        """Minimiser without inequalities, (3, n)."""
+        result: Array = -self.c @ np.linalg.inv(self.one)
+        return result
+
+
+class Found(NamedTuple):
+    size: int
+    active: NDArray[np.int64]
+    images: Array
+    gram: Array
+    missing: Array
+
+
+def draw(seed: int) -> Qp:
     rng = np.random.default_rng(seed)
-    size, rows = int(rng.integers(2, 20)), int(rng.integers(1, 60))
-    root = rng.normal(size=(size, size))
-    P = root @ root.T + np.eye(size)
-    c, inside = 3.0 * rng.normal(size=size), rng.normal(size=size)
-    G = rng.normal(size=(rows, size))
-    low = G @ inside - rng.uniform(0.1, 2.0, rows)
-    x_min, x_max = inside - rng.uniform(0.1, 2.0, size), inside + rng.uniform(0.1, 2.0, size)
-    A, b = np.zeros((0, size)), np.zeros(0)
-    found = np.empty(size, np.int64)
-    H = np.linalg.inv(P)
-    count = binding_rows(H, -H @ c, np.ascontiguousarray(G.T), low, x_min, x_max, found)
-    assert count >= 0
-    chosen = np.sort(found[:count])
-    whole = solve_once(P, c, A, b, G, low, x_min, x_max)
-    part = solve_once(P, c, A, b, G[chosen], low[chosen], x_min, x_max)
-    # The solver stops at a duality gap; the Hessian's curvature is at least 1, so this is a distance.
-    gap = 1e-9 * (1.0 + abs(0.5 * whole.x @ P @ whole.x + c @ whole.x))
-    near = 2.0 * np.sqrt(2.0 * gap)
-    np.testing.assert_allclose(part.x, whole.x, atol=near)
-    slack = (G @ whole.x - low) / np.linalg.norm(G, axis=1)
-    assert set(np.flatnonzero(whole.multipliers > 1e-3)) <= set(chosen) <= set(np.flatnonzero(slack < near))
+    n, planes = int(rng.integers(2, 13)), int(rng.integers(0, 5))
+    S_v, S_x, _ = prediction(n, DT)
+    v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (S_v, S_x))
+    maps = np.stack([x, x + 0.5 * DT * v, S_x])
+    root = rng.normal(size=(n, n))
+    inside = rng.normal(size=(3, n))
+    normals = rng.normal(size=(planes, n, 3))
+    low = np.empty(18 * n + normals.size)
+    none = np.zeros(3)
+    row_bounds(none, none, DT, np.zeros(18 * n), normals, np.zeros_like(normals), low)
+    finite = np.flatnonzero(np.isfinite(low))
+    G = np.empty((len(finite), 3, n))
+    write_rows(finite, np.ascontiguousarray(S_v), maps, normals, G)
+    room = rng.uniform(0.01, 0.5) * rng.uniform(0.1, 2.0, len(finite))
+    low[finite] = np.einsum("rij,ij->r", G, inside) - room
+    half = rng.uniform(0.1, 2.0, (2, 3, n))
+    one = root @ root.T + np.eye(n)
+    c = 10.0 * rng.normal(size=(3, n))
+    return Qp(one, c, np.ascontiguousarray(S_v), maps, normals, low, inside - half[0], inside + half[1])
 
 
-def test_rows_that_contradict_each_other_have_no_minimiser() -> None:
-    G, low = np.array([[1.0], [-1.0]]), np.array([1.0, 0.0])
-    args = np.eye(1), np.zeros(1), np.ascontiguousarray(G.T), low, -np.ones(1) * 9, np.ones(1) * 9
-    assert binding_rows(*args, np.empty(1, np.int64)) == -1
-    with pytest.raises(SolverError):
-        solve_once(np.eye(1), np.zeros(1), np.zeros((0, 1)), np.zeros(0), G, low, -np.ones(1), np.ones(1))
+def find(qp: Qp) -> Found:
+    n = len(qp.one)
+    memory = np.zeros(MOST, np.int64), np.zeros((MOST, 3, n)), np.zeros((MOST, MOST)), np.zeros(MOST)
+    H: Array = np.asarray(np.linalg.inv(qp.one), dtype=np.float64)
+    rows = qp.S_v, qp.maps, qp.normals, qp.low
+    count = active_set(H, qp.start, DT, *rows, qp.x_min, qp.x_max, *memory)
+    return Found(count, *memory)
+
+
+def minimiser(qp: Qp) -> Array:
+    """Minimiser (3, n) with all rows and bounds, by another solver."""
+    n = len(qp.one)
+    finite = np.flatnonzero(np.isfinite(qp.low))
+    G = np.empty((len(finite), 3, n))
+    write_rows(finite, qp.S_v, qp.maps, qp.normals, G)
+    upper = np.concatenate([qp.x_max.ravel(), np.full(len(finite), 1e30)])
+    lower = np.concatenate([qp.x_min.ravel(), qp.low[finite]])
+    P, sense = np.kron(np.eye(3), qp.one), np.zeros(len(upper), dtype=np.int32)
+    matrix = np.ascontiguousarray(G.reshape(len(finite), -1))
+    x, _, flag, _ = daqp.solve(P, qp.c.ravel(), matrix, upper, lower, sense, primal_tol=1e-11)
+    assert flag == 1
+    result: Array = x.reshape(3, n)
+    return result
+
+
+@given(seeds)
+def test_what_binds_determines_the_minimiser(seed: int) -> None:
+    qp = draw(seed)
+    found = find(qp)
+    assert found.size >= 0
+    k = found.size
+    multipliers: Array = np.asarray(np.linalg.solve(found.gram[:k, :k], found.missing[:k]), dtype=np.float64)
+    x, of_rows = np.empty_like(qp.c), np.zeros(len(qp.low))
+    rest = DT, qp.normals, qp.low, qp.x_min, qp.x_max
+    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, of_rows)
+    assert violation < 1e-7
+    np.testing.assert_allclose(x, minimiser(qp), rtol=0.0, atol=1e-5)
+    rows = found.active[:k][found.active[:k] < len(qp.low)]
+    assert set(np.flatnonzero(of_rows)) <= set(rows)
+
+
+@given(seeds)
+def test_another_set_is_not_taken_for_it(seed: int) -> None:
+    """Without one constraint that binds it is violated, and with one too many a multiplier is negative."""
+    qp = draw(seed)
+    found = find(qp)
+    if found.size < 1:
+        return
+    k = found.size - 1
+    multipliers: Array = np.asarray(np.linalg.solve(found.gram[:k, :k], found.missing[:k]), dtype=np.float64)
+    x, of_rows = np.empty_like(qp.c), np.zeros(len(qp.low))
+    rest = DT, qp.normals, qp.low, qp.x_min, qp.x_max
+    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, of_rows)
+    assert violation > 1e-9 or np.abs(x - minimiser(qp)).max() < 1e-5
+    negative = np.concatenate([multipliers, [-1.0]])
+    assert combine(qp.start, found.images, negative, found.active, *rest, x, of_rows) == np.inf
+
+
+@pytest.mark.parametrize("value", [np.nan, 3.0])
+def test_a_qp_without_a_minimiser_has_no_active_set(value: float) -> None:
+    """Bounds that contradict each other, and a cost that is not finite."""
+    qp = draw(3)
+    if np.isnan(value):
+        qp.c[1, 0] = value
+    else:
+        qp.x_min[:], qp.x_max[:] = value, -value
+    assert find(qp).size == -1

@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.rows import row_bounds, row_columns, row_slacks
+from companion.avoidance.certified.qp_vectors import row_bounds
+from companion.avoidance.certified.rows import relax_limits, row_slacks, write_rows
 from companion.values.prediction import prediction
 
 
@@ -22,12 +23,12 @@ def test_slacks_are_the_rows_times_the_accelerations(seed: int, n: int, count: i
     limits = rng.normal(size=18 * n)
     low, slack = np.empty((2, 18 * n + 3 * count * n))
     row_bounds(position, velocity, dt, limits, normals, wanted, low)
-    row_slacks(a, dt, normals, low, slack)
+    row_slacks(np.ascontiguousarray(a.T), dt, normals, low, slack)
     finite = np.flatnonzero(np.isfinite(low))
     assert len(low) - len(finite) == count
-    G_T = np.zeros((3 * n, len(finite)))
-    row_columns(finite, np.ascontiguousarray(S_v), maps, normals, G_T)
-    np.testing.assert_allclose(a.T.ravel() @ G_T - low[finite], slack[finite], atol=1e-12)
+    G = np.empty((len(finite), 3, n))
+    write_rows(finite, np.ascontiguousarray(S_v), maps, normals, G)
+    np.testing.assert_allclose(np.einsum("rij,ji->r", G, a) - low[finite], slack[finite], atol=1e-12)
     # The same from the motion: speeds and control points from the state, along axes and normals.
     times = dt * (np.arange(n)[:, None] + np.array([0.0, 0.5, 1.0]))
     points = position + times[:, :, None] * velocity + np.einsum("bij,jk->ibk", maps, a)
@@ -36,3 +37,8 @@ def test_slacks_are_the_rows_times_the_accelerations(seed: int, n: int, count: i
     planes = np.einsum("mnk,nik->mni", normals, points) - wanted
     expected = np.concatenate([np.concatenate(moved) - limits, planes.ravel()])
     np.testing.assert_allclose(slack[finite], expected[finite], atol=1e-12)
+    # Limits that are violated, and they alone, are lowered until they just hold.
+    relaxed = low.copy()
+    relax_limits(np.ascontiguousarray(a.T), dt, relaxed)
+    lowered = np.where(np.arange(len(low)) < len(limits), np.minimum(slack, 0.0), 0.0)
+    np.testing.assert_allclose(relaxed[finite], (low + lowered)[finite], atol=1e-12)
