@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import time
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
+from companion.avoidance.field.dqmpc import Problem
 from companion.avoidance.field.planner import Aim, Planner, standing
+from companion.avoidance.solver import QpSolver
 from companion.config import CompanionConfig
 from companion.flight.setpoint import setpoint
 from companion.goals.heading import Heading
 from companion.telemetry.sharing import position_message
 from companion.values.bearings import bearing
 from companion.values.components import COMPONENT
+from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
 from companion.world import World
 from mavlink_bridge.frames import FleetFrame
@@ -35,11 +39,21 @@ class Scene(NamedTuple):
     aim: Aim
 
 
-def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return CPU times (ms) of plan steps and of their three QPs alone, over crowded scenes.
+class Times(NamedTuple):
+    """CPU times (ms) of plan steps, of their three QPs alone, and of these QPs as PIQP solves them whole.
 
-    A plan step goes from the world to plan and set-point; its QPs are then solved once more.
+    A plan step goes from the world to plan and set-point; its QPs are then solved once more, as the plan step
+    solves them: for what binds. Whole QPs have all variables and their bounds, and no state limits. Their
+    time does not depend on the planner: it is a yardstick for the rest of a plan step.
     """
+
+    steps: Array
+    qps: Array
+    whole_qps: Array
+
+
+def plan_step(rounds: int) -> Times:
+    """Return the times of plan steps over crowded scenes."""
     config = load(find("scenarios", "antipodal-8"), Scenario).companion
     scenes = [_scene(config, seed) for seed in range(60)]
     # Each scene has its own planner, because a planner keeps state between plans.
@@ -50,7 +64,7 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
         heading.reset(bearing(scene.position, scene.aim.target))
     fleet = scenes[0].world.fleet
     local = fleet.local(fleet.latitude, fleet.longitude, fleet.altitude)
-    steps, solving = [], []
+    steps, solving, problems = [], [], []
     horizon = config.horizon
     ahead = 1e-6 * horizon.dt_us * np.arange(1, horizon.steps + 2)
     now = 1_000_000
@@ -71,8 +85,20 @@ def plan_step(rounds: int) -> tuple[np.ndarray, np.ndarray]:
             if turn:
                 steps.append(finished - started)
                 solving.append(solved - finished)
+            else:
+                problems.append((plan.problem, plan.omega_scale))
             _all_act(obstacles)
-    return np.array(steps) * 1e-6, np.array(solving) * 1e-6
+    solver_of = cache(lambda omega_scale: QpSolver(planners[0].dqmpc.hessian(omega_scale)))
+    whole = [_whole(problem, solver_of(omega_scale)) for problem, omega_scale in rounds * problems]
+    return Times(*(1e-6 * np.array(spent) for spent in (steps, solving, whole)))
+
+
+def _whole(problem: Problem, solver: QpSolver) -> int:
+    """Return the CPU time (ns) of PIQP's solutions of the three whole QPs."""
+    started = time.thread_time_ns()
+    for c, x_l, x_u in zip(problem.c, problem.x_l, problem.x_u, strict=True):
+        solver.solve(c, x_l, x_u)
+    return time.thread_time_ns() - started
 
 
 def _scene(config: CompanionConfig, seed: int) -> Scene:
