@@ -24,7 +24,7 @@ from companion.planning.planning import Planning
 from companion.planning.setpoints import Setpoints
 from companion.telemetry.metrics import Metrics
 from companion.telemetry.reception import LINKS, accepts
-from companion.telemetry.sharing import Sharing
+from companion.telemetry.sharing import NOTHING_SHARED, Sharing
 from companion.telemetry.status_text import StatusReporter
 from companion.values.components import COMPONENT
 from companion.values.horizon import Horizon
@@ -86,6 +86,7 @@ class Companion:
         self.reporter = StatusReporter(config.ground_messages, own)
         self._checks = HealthChecks(config, world, pilot, self.avoidance, self._round_trips, self.reporter)
         self.health = self._checks.monitor
+        self._reports_on = config.ground_messages.texts or config.ground_messages.values
         self._started = False
 
     @property
@@ -159,15 +160,18 @@ class Companion:
         self._goals.forget(view)
         self._planning.step(now, view, cautious=self.health.blinkered)
         setpoints = self._setpoints.due(now, view)
-        shared = self._sharing.due(now, view, self.avoidance.shared(now, view), self.world.doubt)
+        shared = NOTHING_SHARED
+        if now >= self._sharing.next_due:
+            shared = self._sharing.due(now, view, self.avoidance.shared(now, view), self.world.doubt)
         leaving = self.pilot.phase in (Phase.LAND, Phase.DONE)
         announced = self.avoidance.messages(now, farewell=leaving)
-        reports = self._reports(now)
-        return self._encode(
-            autopilot=[*commands, *requests, *setpoints, *shared.autopilot, *reports.get("autopilot", ())],
-            swarm=shared.swarm + announced,
-            ground=[*answers, *reports.get("ground", ())],
-        )
+        autopilot = [*commands, *requests, *setpoints, *shared.autopilot]
+        swarm, ground = [*shared.swarm, *announced], answers
+        if self._reports_on:
+            reports = self._reports(now)
+            autopilot += reports.get("autopilot", ())
+            ground += reports.get("ground", ())
+        return self._encode(autopilot=autopilot, swarm=swarm, ground=ground)
 
     def _start(self, now: int) -> None:
         """Start the periods of avoidance, set-points and health checks at ``now`` (µs), the first step."""
@@ -210,13 +214,10 @@ class Companion:
 
     def _reports(self, now: int) -> dict[str, list[Message]]:
         """Return status texts and metrics, by the link that carries them."""
-        settings = self.config.ground_messages
-        if not (settings.texts or settings.values):
-            return {}
         report_silence(now, self.world, self.reporter)
         messages: list[Message] = [*self.reporter.due(now)]
         messages += self._metrics.due(now, self.avoidance.held, self.world.target.age(now))
-        return dict.fromkeys(settings.links, messages)
+        return dict.fromkeys(self.config.ground_messages.links, messages)
 
     def _encode(self, **links: list[Message]) -> list[Datagram]:
         """Return one datagram for each link that has messages."""

@@ -233,19 +233,17 @@ class World:
 
     def _receive_own(self, now: int, message: Message) -> None:
         """Process a position, attitude or origin of the own autopilot."""
-        if isinstance(message, LocalPosition | Attitude):
-            self.stamp = message.time_boot
         if isinstance(message, LocalPosition):
+            self.stamp = message.time_boot
             if self._local is not None:
-                place = self._local.position_to_fleet(message.position_ned)
-                self._own.measure(
-                    now, place, self._local.velocity_to_fleet(message.velocity_ned), message.time_boot
-                )
+                place, velocity = self._local.motion_to_fleet(message.position_ned, message.velocity_ned)
+                self._own.measure(now, place, velocity, message.time_boot)
                 if self._last_in_old_frame is not None:
                     self.moves += 1
                     self.displaced = float(np.linalg.norm(place - self._last_in_old_frame.position))
                     self._last_in_old_frame = None
         elif isinstance(message, Attitude):
+            self.stamp = message.time_boot
             if self._local is not None:
                 self._yaw = self._local.yaw_to_fleet(message.yaw)
                 self._yaw_time = self._own.when(now, message.time_boot)

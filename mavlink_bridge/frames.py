@@ -119,7 +119,7 @@ class FleetFrame:
         form. The closed form takes over where the iteration does not converge (hundreds of kilometres away,
         next to a pole).
         """
-        east, north, up = (float(part) for part in np.asarray(enu, dtype=np.float64))
+        east, north, up = np.asarray(enu, dtype=np.float64).tolist()
         latitude, longitude, altitude = self.latitude, self.longitude, self.altitude
         missing = (east, north, up)
         for _ in range(_MAX_ITERATIONS):
@@ -174,6 +174,10 @@ class LocalFrame:
     def velocity_to_fleet(self, ned: npt.ArrayLike) -> Array:
         """Convert free vectors (…, 3), velocities or accelerations, from vehicle-local NED to fleet ENU."""
         return np.asarray(ned, dtype=np.float64) @ self.rotation.T
+
+    def motion_to_fleet(self, position: Point, velocity: Point) -> tuple[Array, Array]:
+        """Convert one position (3,), m, and one free vector (3,) from vehicle-local NED to fleet ENU."""
+        return self.rotation.dot(position) + self.origin_fleet, self.rotation.dot(velocity)
 
     def position_to_local(self, enu: npt.ArrayLike) -> Array:
         """Convert positions (…, 3), m, from fleet ENU to vehicle-local NED."""

@@ -32,26 +32,17 @@ track's time continues.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
-from itertools import islice, pairwise
 from typing import NamedTuple
+
+from companion.estimation.lag_pieces import MAX_PIECES, Piece, line_below, recent, steady_rate
 
 _SECOND_US = 1_000_000
 _DRIFT = 200e-6
 """Rate at which the line rises: two quartz clocks drift against each other by less."""
 _PIECE_US = 5 * _SECOND_US
 """Length of a piece (an interval of time); the least lag of each piece is kept."""
-_MAX_PIECES = 13
-"""Number of pieces; from the first to the last they cover more than a minute."""
-_MIN_PIECES_FOR_RATE = 7
-"""Number of pieces (half a minute) over which lags must have changed steadily for a rate to be learnt.
-
-Steadily: the spread of the lags about a straight line is at most the share ``_MAX_NONLINEARITY`` of their
-whole change; a delay that rises in a few steps exceeds it. A rate below ``_MIN_LEARNT_RATE`` is not learnt.
-"""
-_MAX_NONLINEARITY, _MIN_LEARNT_RATE = 0.125, 0.002
 _UNUSABLE_US = 400_000
-"""The line is raised to the lags of ``_MAX_PIECES`` pieces if all of them exceed it by more than this.
+"""The line is raised to the lags of ``MAX_PIECES`` pieces if all of them exceed it by more than this.
 
 With messages of that age the sender would be unusable.
 """
@@ -86,18 +77,6 @@ class TrackTime(NamedTuple):
 
     time: int
     stamped: bool
-
-
-class _Least(NamedTuple):
-    """The least ``lag`` of a piece that started at ``begun``.
-
-    ``received``: when its message arrived; ``above``: its distance above the line. All µs.
-    """
-
-    begun: int
-    received: int
-    lag: int
-    above: float
 
 
 class _Outlier(NamedTuple):
@@ -171,8 +150,8 @@ class SenderClock:
         self._received = 0
         self._line = 0.0
         self._rate = 0.0
-        self._pieces: deque[_Least] = deque(maxlen=_MAX_PIECES)
-        self._least = _Least(0, 0, 0, 0.0)
+        self._pieces: deque[Piece] = deque(maxlen=MAX_PIECES)
+        self._least = Piece(0, 0, 0, 0.0)
 
     def date(self, received: int, stamp: int) -> TrackTime | None:
         """Return the track time at which the content of a message was true.
@@ -188,7 +167,8 @@ class SenderClock:
         if self._base is None:
             return self._outlier(_Outlier(received, stamp))
         lag = received - stamp
-        expected = self._line + self._rate * max(received - self._received, 0)
+        elapsed = received - self._received
+        expected = self._line + self._rate * elapsed if elapsed > 0 else self._line
         if stamp < self._newest - self._tolerance or lag < expected - self._tolerance:
             return self._outlier(_Outlier(received, stamp))
         if stamp != self._stamp:
@@ -254,7 +234,7 @@ class SenderClock:
         """Discard the lags so far: they belong to another line."""
         self._pieces.clear()
         received, lag = self._received, self._lag
-        self._least = _Least(received, received, lag, max(lag - self._line, 0.0))
+        self._least = Piece(received, received, lag, max(lag - self._line, 0.0))
 
     def _by_arrival(self, received: int) -> TrackTime:
         """Return the track time of a message without a usable stamp."""
@@ -280,7 +260,7 @@ class SenderClock:
         self._last_lags.append(lag)
         self._received, self._line, self._rate = received, float(lag), 0.0
         self._pieces.clear()
-        self._least = _Least(received, received, lag, 0.0)
+        self._least = Piece(received, received, lag, 0.0)
         self.support = support
         return TrackTime(stamp + self._base, True)
 
@@ -315,17 +295,20 @@ class SenderClock:
         if self.brief:
             self._received, self._line, self._rate = received, float(min(self._last_lags)), 0.0
             return
-        self._received = received = max(received, self._received)
-        self._line = line = min(float(lag), expected)
+        if received > self._received:
+            self._received = received
+        else:
+            received = self._received
+        self._line = line = float(lag) if lag < expected else expected
         least = self._least
         if received < least.begun + _PIECE_US:
             if lag < least.lag:
-                self._least = _Least(least.begun, received, lag, lag - line)
+                self._least = Piece(least.begun, received, lag, lag - line)
             return
         self._pieces.append(least)
         self._raise(received)
         self._line = line = min(float(lag), self._line)
-        self._least = _Least(received, received, lag, lag - line)
+        self._least = Piece(received, received, lag, lag - line)
 
     def _raise(self, received: int) -> None:
         """Raise the line at the end of a piece if the kept pieces allow it, and set its rate."""
@@ -337,48 +320,13 @@ class SenderClock:
         if len(pieces) == 1:
             # During the first piece the line is kept level; the drift of this time is added here.
             self._line += _DRIFT * (received - pieces[0].received)
-        recent = list(islice(pieces, max(len(pieces) - _MIN_PIECES_FOR_RATE, 0), None))
-        learnt = _steady_rate(recent)
+        last = recent(pieces)
+        learnt = steady_rate(last)
         self._rate = _DRIFT + learnt
         if learnt > 0.0:
             # A delay above the line at the beginning of these pieces still counts as age.
-            self._line = max(self._line, _line_below(recent, self._rate, received) - recent[0].above)
-        if len(pieces) == _MAX_PIECES:
-            youngest = _line_below(pieces, _DRIFT, received)
+            self._line = max(self._line, line_below(last, self._rate, received) - last[0].above)
+        if len(pieces) == MAX_PIECES:
+            youngest = line_below(pieces, _DRIFT, received)
             if youngest > self._line + _UNUSABLE_US:
                 self._line = youngest
-
-
-def _line_below(pieces: Sequence[_Least], rate: float, received: int) -> float:
-    """Return the value at ``received`` of the line of this ``rate`` that touches ``pieces`` from below."""
-    return min(piece.lag + rate * (received - piece.received) for piece in pieces)
-
-
-def _steady_rate(pieces: Sequence[_Least]) -> float:
-    """Return the rate at which the lags have changed steadily; 0 if they have not, or it is not known yet."""
-    if len(pieces) < _MIN_PIECES_FOR_RATE:
-        return 0.0
-    rate = _slope_below(pieces)
-    if abs(rate) < _MIN_LEARNT_RATE:
-        return 0.0
-    off = [piece.lag - rate * (piece.received - pieces[0].received) for piece in pieces]
-    change = abs(rate) * (pieces[-1].received - pieces[0].received)
-    return rate if max(off) - min(off) <= _MAX_NONLINEARITY * change else 0.0
-
-
-def _slope_below(pieces: Sequence[_Least]) -> float:
-    """Return the slope of the highest line below all ``pieces``.
-
-    It is the slope of the edge of their lower hull at the middle of their time.
-    """
-    hull: list[_Least] = []
-    for point in pieces:
-        while len(hull) > 1 and _slope(hull[-2], hull[-1]) >= _slope(hull[-1], point):
-            hull.pop()
-        hull.append(point)
-    middle = (pieces[0].received + pieces[-1].received) / 2
-    return next(_slope(a, b) for a, b in pairwise(hull) if b.received >= middle)
-
-
-def _slope(a: _Least, b: _Least) -> float:
-    return (b.lag - a.lag) / (b.received - a.received)

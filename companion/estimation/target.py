@@ -7,9 +7,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.config.target_source import CameraSource, FixedSource, message_of, sender_of
-from companion.estimation.tracks import State, Track
-from companion.values.horizon import Array
-from mavlink_bridge.frames import FleetFrame, ned_to_enu
+from companion.estimation.tracks import State, Track, measured
+from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import (
     BY_ID,
     CameraTrackingGeo,
@@ -18,6 +17,7 @@ from mavlink_bridge.messages import (
     Message,
     Source,
 )
+from mavlink_bridge.messages.source import Vector
 
 
 class Target:
@@ -108,21 +108,21 @@ class Target:
 
     def _measure(self, now: int, message: Message) -> bool:
         """Add the measurement in ``message`` to the track; return whether it was accepted."""
-        velocity: Array | None
+        velocity: Vector | None
         if isinstance(message, GlobalPosition):
-            velocity, stamp = ned_to_enu(message.velocity_ned), message.time_boot
+            velocity, stamp = message.velocity_ned, message.time_boot
         elif isinstance(message, FollowTarget):
             # In FOLLOW_TARGET three zeros also stand for an unknown velocity.
-            reported = message.velocity if message.velocity is not None and any(message.velocity) else None
-            velocity, stamp = None if reported is None else ned_to_enu(reported), message.time_boot
+            velocity = message.velocity if message.velocity is not None and any(message.velocity) else None
+            stamp = message.time_boot
         elif (
             isinstance(message, CameraTrackingGeo)
             and message.status == mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE
         ):
-            velocity = None if message.velocity_ned is None else ned_to_enu(message.velocity_ned)
-            stamp = 0
+            velocity, stamp = message.velocity_ned, 0
         else:
             self.refused += 1
             return False
-        position = self._fleet.to_enu(message.latitude, message.longitude, message.altitude)
-        return self._track.measure(now, position, velocity, stamp)
+        place = self._fleet.to_east_north_up(message.latitude, message.longitude, message.altitude)
+        speed = None if velocity is None else (velocity[1], velocity[0], -velocity[2])
+        return self._track.take(now, measured(place, speed, upward=self._config.target.velocity_up), stamp)

@@ -159,9 +159,9 @@ class Track:
             return None
         age = now - self._clock.skew - belief.time
         longest = self._config.extrapolate_us
-        dt = 1e-6 * min(max(age, 0), longest)
+        dt = 1e-6 * (longest if age > longest else age if age > 0 else 0)
         a, b, c, d, e, f = belief.x
-        rate, sigma = belief.turn.rate, self._sigma(belief, age)
+        rate, sigma = belief.turn[0], self._sigma(belief, age)
         if rate == 0.0:
             position, velocity = np.array((a + dt * d, b + dt * e, c + dt * f)), np.array((d, e, f))
         else:
@@ -195,7 +195,7 @@ class Track:
     def _sigma(self, belief: Belief, age: int) -> float:
         """Return σ (m) of the position on each axis, ``age`` µs after the state."""
         p, c, _, v = belief.P
-        dt = 1e-6 * max(age, 0)
+        dt = 1e-6 * age if age > 0 else 0.0
         grown = self._config.sigma_acceleration**2 * dt**3 / 3.0
         return math.sqrt(p + dt * (2.0 * c + dt * v) + grown)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from math import isnan
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -100,4 +101,4 @@ class Commands:
 
 def _key(command: int, params: tuple[float, ...]) -> _Call:
     # NaN parameters are left out, because NaN does not equal itself.
-    return command, tuple(p for p in params if p == p)
+    return command, tuple(p for p in params if p == p) if isnan(sum(params)) else params

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -47,6 +48,12 @@ def _interval(message: int, interval: int) -> tuple[int, Params]:
     return mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, params
 
 
+@lru_cache
+def _position_quality_requests(estimator_message: int) -> tuple[tuple[int, Params], ...]:
+    messages = mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, estimator_message
+    return tuple(_interval(message, HEALTH) for message in messages)
+
+
 _REQUIRED_REQUESTS = tuple(_interval(message, interval) for message, interval in STREAMS.items())
 
 
@@ -83,10 +90,10 @@ class Readiness:
         profile = self._vehicle.profile
         if profile is None or not self._vehicle.alive:
             return []
-        health = mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, profile.estimator_message
-        wanted = [_interval(message, HEALTH) for message in health]
-        unanswered = [call for call in wanted if not self._requests.answered(*call)]
-        return self._requests.call(now, *unanswered[0]) if unanswered else []
+        for call in _position_quality_requests(profile.estimator_message):
+            if not self._requests.answered(*call):
+                return self._requests.call(now, *call)
+        return []
 
     def unseen(self, view: View) -> str:
         """Return the first missing input that every plan needs, or an empty string."""

@@ -96,10 +96,14 @@ class Tracking:
         self._drag, self._drag_variance, self._max_acceleration = 0.0, _DRAG_VARIANCE, inf
         self.errors = Errors()
         """Errors of all observed set-points."""
-        self.reset()
+        self._reset()
 
     def reset(self) -> None:
         """Reset the observer while no set-points are followed; κ is kept, as a property of the vehicle."""
+        if self._last_time is not None:
+            self._reset()
+
+    def _reset(self) -> None:
         self._last_time: int | None = None
         self.error: Array = np.zeros(3)
         self.envelope = 0.0

@@ -83,6 +83,7 @@ class Neighbours:
         self._config = config
         self._system = system
         self._fleet = fleet
+        self._velocity_up = config.neighbour.velocity_up
         self._tracks: dict[int, Track] = {}
         # The tracks' last states as rows, in the order of the tracks. They are sampled together at every
         # plan, after the rows of the tracks that received messages have been updated.
@@ -144,26 +145,28 @@ class Neighbours:
         if track is None or self._by_autopilot[system] != by_autopilot:
             track = Track(self._config.neighbour)
             track.brief = self._brief
-        placed = _placed(self._fleet, message, self._config.neighbour.velocity_up)
+        placed = _placed(self._fleet, message, self._velocity_up)
         refused, before = track.refused, track.time
-        reported = track.take(now, placed, message.time_boot) or track.refused > refused
-        if reported and not by_autopilot:
+        accepted = track.take(now, placed, message.time_boot)
+        if not by_autopilot and (accepted or track.refused > refused):
             # Unusable positions, such as those of a receiver without a fix, do not suppress the autopilot's
             # messages.
             self._companion_time[system] = now
-        if track.time is None:
+        time = track.time
+        if time is None:
             return
-        if track.time != before:
+        if time != before:
             self._received[system] = now
-        if system not in self._rows:
-            self._rows[system] = len(self._ids)
+        row = self._rows.get(system)
+        if row is None:
+            row = self._rows[system] = len(self._ids)
             self._ids += (system,)
             self._states = np.vstack([self._states, np.zeros(6)])
             self._times = np.append(self._times, now)
             self._arrivals = np.append(self._arrivals, now)
         self._tracks[system], self._by_autopilot[system] = track, by_autopilot
         self._fresh.add(system)
-        self._trusted.note(now, self._rows[system], track)
+        self._trusted.note(now, row, track)
 
     def receive_plan(self, now: int, message: Tunnel) -> None:
         """Receive a neighbour's TUNNEL message: its horizon, or the uncertainty of its position.

@@ -7,8 +7,6 @@ be at either position; and a vehicle that shares no plan is not bound by any kno
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,16 +21,12 @@ _MAX_PLAN_OFFSET = 1.0
 """m between the plan and that state, at most."""
 
 
-class _Record(NamedTuple):
-    track: Track
-    refused: int
-
-
 class TrustedPeers:
     """Trust of one companion in its neighbours, in the order of the rows of their last states."""
 
     def __init__(self) -> None:
-        self._records: list[_Record] = []
+        self._tracks: list[Track] = []
+        self._refused: list[int] = []
         self._since = np.zeros(0, dtype=np.int64)
 
     def note(self, now: int, row: int, track: Track) -> None:
@@ -41,14 +35,13 @@ class TrustedPeers:
         ``row`` is an existing one or the next one. This must be called for every message that was given to
         the track; otherwise a refused or doubted measurement is missed.
         """
-        record = _Record(track, track.refused)
-        if row == len(self._records):
-            self._records.append(record)
+        refused = track.refused
+        if row == len(self._tracks):
+            self._tracks.append(track)
+            self._refused.append(refused)
             self._since = np.append(self._since, now)
-            return
-        last = self._records[row]
-        if last.track is not track or last.refused != record.refused or track.doubted:
-            self._records[row] = record
+        elif self._tracks[row] is not track or self._refused[row] != refused or track.doubted:
+            self._tracks[row], self._refused[row] = track, refused
             self._since[row] = now
 
     def trusted(self, now: int, states: Array, plans: Located) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ understands it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -14,9 +15,9 @@ from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon
 from companion.world import View
 from mavlink_bridge.errors import PlanWireError
-from mavlink_bridge.frames import FleetFrame, enu_to_ned, yaw_to_ned
+from mavlink_bridge.frames import FleetFrame, yaw_to_ned
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, Source, Tunnel
-from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack, quantise
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, packed
 from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 from mavlink_bridge.wire.uncertainty import pack as pack_doubt
 
@@ -34,8 +35,11 @@ def onboard_heartbeat(own: Source) -> Heartbeat:
 class Shared(NamedTuple):
     """Messages to send, by link."""
 
-    autopilot: list[Message]
-    swarm: list[Message]
+    autopilot: Sequence[Message]
+    swarm: Sequence[Message]
+
+
+NOTHING_SHARED = Shared((), ())
 
 
 class Sharing:
@@ -47,12 +51,9 @@ class Sharing:
         self._fleet = fleet
         self._boot: int | None = None
         self._next = [0, 0, 0]
-        self._doubted: int | None = None
-
-    @property
-    def next_due(self) -> int:
+        self.next_due = 0
         """Time (µs) at which the next message may be due; 0 before the first call of ``due``."""
-        return min(self._next)
+        self._doubted: int | None = None
 
     def due(self, now: int, view: View, horizon: Horizon | None, doubt: float = 0.0) -> Shared:
         """Return the messages that are due at ``now`` (µs).
@@ -64,24 +65,26 @@ class Sharing:
             self._boot = now
             self._next = [now, now, now]
         rates = self._config.rates
-        shared = Shared([], [])
+        autopilot: list[Message] = []
+        swarm: list[Message] = []
         if self._passes(0, now, _SECOND):
             beat = onboard_heartbeat(self._own)
-            shared.autopilot.append(beat)
-            shared.swarm.append(beat)
+            autopilot.append(beat)
+            swarm.append(beat)
         fresh = view.own is not None and view.own.age <= self._config.guard.own_stale_us
         if self._passes(1, now, rates.state_us) and fresh:
-            shared.swarm.append(self._position(now - self._boot, view))
+            swarm.append(self._position(now - self._boot, view))
             if doubt > 0.0:
                 self._doubted = now
             if self._doubted is not None and now - self._doubted <= _CLEAR_US:
                 # GLOBAL_POSITION_INT has no field for the uncertainty.
-                shared.swarm.append(Tunnel(self._own, 0, 0, DOUBT, pack_doubt(doubt)))
+                swarm.append(Tunnel(self._own, 0, 0, DOUBT, pack_doubt(doubt)))
         if self._passes(2, now, rates.plan_us) and horizon is not None and self._config.shares_plan:
             plan = plan_message(horizon, self._own, self._fleet)
             if plan is not None:
-                shared.swarm.append(plan)
-        return shared
+                swarm.append(plan)
+        self.next_due = min(self._next)
+        return Shared(autopilot, swarm)
 
     def _passes(self, kind: int, now: int, period: int) -> bool:
         if now < self._next[kind]:
@@ -104,9 +107,9 @@ def position_message(
     Position (3,) m and velocity (3,) m/s are fleet-local ENU; ``yaw`` is NED (rad); ``since_boot`` is in µs.
     """
     latitude, longitude, altitude = fleet.to_geodetic(position)
-    north, east, down = enu_to_ned(velocity).tolist()
+    east, north, up = velocity.tolist()
     return GlobalPosition(
-        source, since_boot, latitude, longitude, altitude, float(position[2]), (north, east, down), yaw
+        source, since_boot, latitude, longitude, altitude, float(position[2]), (north, east, -up), yaw
     )
 
 
@@ -117,9 +120,9 @@ def plan_message(horizon: Horizon, source: Source, fleet: FleetFrame) -> Tunnel 
     """
     knots = horizon.knots
     try:
-        plan = quantise(
+        payload = packed(
             horizon.epoch, horizon.dt, knots[0, 0:3], knots[0, 3:6], knots[:-1, 6:9], fleet.fingerprint
         )
     except PlanWireError:
         return None
-    return Tunnel(source, 0, 0, PAYLOAD_TYPE, pack(plan))
+    return Tunnel(source, 0, 0, PAYLOAD_TYPE, payload)

@@ -11,6 +11,8 @@ each knot: 32 + 6 N bytes, N ≤ 16.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import chain
 from struct import Struct
 from struct import error as StructError  # noqa: N812
 from typing import NamedTuple
@@ -33,6 +35,7 @@ Array = npt.NDArray[np.float64]
 
 _HEADER = Struct("<BBH7s3i9s")
 _KNOT = Struct("<3h")
+_KNOTS = [Struct(f"<{3 * n}h") for n in range(KNOTS + 1)]
 
 
 class WirePlan(NamedTuple):
@@ -136,34 +139,61 @@ def quantise(
     ½ A dt² (0.72 mm after 16 knots of 0.1 s). Raises PlanWireError for a wrong shape or
     dt, and for a number that is not finite or out of range.
     """
-    _check_step(dt)
-    p, v, a = (np.asarray(part, dtype=np.float64) for part in (position, velocity, accelerations))
-    if p.shape != (3,) or v.shape != (3,) or a.ndim != 2 or a.shape[1] != 3:
-        raise PlanWireError(f"shapes {p.shape}, {v.shape}, {a.shape} are not (3,), (3,), (n, 3)")
-    scaled = np.concatenate((p / _position_unit(dt), v / _velocity_unit(dt), a.ravel() / 1e-3))
-    # Beyond int64 the cast is undefined; the wire's own limits are far below and are checked by ``pack``.
-    if not np.all(np.abs(scaled) < 2.0**62):
-        raise PlanWireError(f"not finite, or far out of range: {position!r}, {velocity!r}, {accelerations!r}")
-    px, py, pz, vx, vy, vz, *rest = np.rint(scaled).astype(np.int64).tolist()
+    px, py, pz, vx, vy, vz, *rest = _in_wire_units(dt, position, velocity, accelerations).tolist()
     knots = tuple(zip(rest[::3], rest[1::3], rest[2::3], strict=True))
     plan = WirePlan(int(epoch), int(dt), (px, py, pz), (vx, vy, vz), knots, origin)
     pack(plan)
     return plan
 
 
+def _in_wire_units(
+    dt: int, position: npt.ArrayLike, velocity: npt.ArrayLike, accelerations: npt.ArrayLike
+) -> npt.NDArray[np.int64]:
+    """Return position, velocity and accelerations (6 + 3 n,), rounded to the units of the wire."""
+    _check_step(dt)
+    p, v, a = (np.asarray(part, dtype=np.float64) for part in (position, velocity, accelerations))
+    if p.shape != (3,) or v.shape != (3,) or a.ndim != 2 or a.shape[1] != 3:
+        raise PlanWireError(f"shapes {p.shape}, {v.shape}, {a.shape} are not (3,), (3,), (n, 3)")
+    scaled = np.concatenate((p / _position_unit(dt), v / _velocity_unit(dt), a.ravel() / 1e-3))
+    # Beyond int64 the cast is undefined; the wire's own limits are far below and are checked when packing.
+    if not np.abs(scaled).max() < 2.0**62:
+        raise PlanWireError(f"not finite, or far out of range: {position!r}, {velocity!r}, {accelerations!r}")
+    return np.rint(scaled).astype(np.int64)
+
+
 def pack(plan: WirePlan) -> bytes:
     """Encode ``plan`` in 32 + 6 N bytes; raise PlanWireError for a value that does not fit."""
-    if len(plan.accelerations) > KNOTS:
-        raise PlanWireError(f"{len(plan.accelerations)} knots are more than {KNOTS}")
-    _check_step(plan.dt)
+    epoch, dt, position, velocity, accelerations, origin = plan
+    return _packed(epoch, dt, (*position, *velocity, *chain.from_iterable(accelerations)), origin)
+
+
+def packed(
+    epoch: int,
+    dt: int,
+    position: npt.ArrayLike,
+    velocity: npt.ArrayLike,
+    accelerations: npt.ArrayLike,
+    origin: int,
+) -> bytes:
+    """Return what ``pack`` returns for the plan of ``quantise``; raise PlanWireError as these do."""
+    numbers = _in_wire_units(dt, position, velocity, accelerations).tolist()
+    return _packed(int(epoch), int(dt), numbers, origin)
+
+
+def _packed(epoch: int, dt: int, numbers: Sequence[int], origin: int) -> bytes:
+    """Encode a plan; ``numbers`` are position, velocity and accelerations (6 + 3 N,) in wire units."""
+    knots, _ = divmod(len(numbers) - 6, 3)
+    if knots > KNOTS:
+        raise PlanWireError(f"{knots} knots are more than {KNOTS}")
+    _check_step(dt)
     try:
-        velocity = b"".join(v.to_bytes(3, "little", signed=True) for v in plan.velocity)
-        header = _HEADER.pack(
-            KIND, plan.origin, plan.dt // STEP, plan.epoch.to_bytes(7, "little"), *plan.position, velocity
-        )
-        return header + b"".join(_KNOT.pack(*a) for a in plan.accelerations)
+        speed = b"".join(v.to_bytes(3, "little", signed=True) for v in numbers[3:6])
+        header = _HEADER.pack(KIND, origin, dt // STEP, epoch.to_bytes(7, "little"), *numbers[:3], speed)
+        return header + _KNOTS[knots].pack(*numbers[6:])
     except (OverflowError, StructError):
-        raise PlanWireError(f"out of range of the wire: {plan}") from None
+        raise PlanWireError(
+            f"out of range of the wire: epoch {epoch}, dt {dt}, origin {origin}, {numbers}"
+        ) from None
 
 
 class PlannedMotion(NamedTuple):
