@@ -17,21 +17,21 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
-from companion.estimation.estimator import Measured
-from companion.estimation.plan_clock import PlanClock
+from companion.estimation.estimator import Measured, Six
 from companion.estimation.tracks import State, Track, measured
+from companion.obstacles.alignment import align, extrapolate, within
 from companion.obstacles.reachable_ball import Ball, flown_on
 from companion.obstacles.relevance_filter import Ages, RelevanceFilter
+from companion.obstacles.shared_plans import SharedPlans
 from companion.obstacles.trusted_peers import TrustedPeers
 from companion.obstacles.uncertainty import ReportedUncertainty
-from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, output
-from companion.values.horizon import Array, Horizon, HorizonTable, roll_out
+from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
 from companion.values.vectors import limit
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import GlobalPosition, Tunnel
-from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack_motion
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE
 from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 
 _SYSTEM_IDS = 255
@@ -46,19 +46,7 @@ With ``guard.astray_us`` the limit is ``guard.tube``.
 
 
 @lru_cache(maxsize=1024)
-def _read(payload: bytes) -> tuple[int, Horizon]:
-    """Return fingerprint and horizon of a plan on the wire; raises PlanWireError.
-
-    If many companions share a process, each plan is decoded once.
-    """
-    plan = unpack_motion(payload)
-    horizon = roll_out(plan.epoch, plan.dt, plan.position, plan.velocity, plan.accelerations)
-    horizon.knots.flags.writeable = False
-    return plan.origin, horizon
-
-
-@lru_cache(maxsize=1024)
-def _placed(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measured | None:
+def measurement_of(fleet: FleetFrame, message: GlobalPosition, upward: bool) -> Measured | None:
     """Return the measurement in a message, None if invalid; each message is converted once per process."""
     north, east, down = message.velocity_ned
     place = fleet.to_east_north_up(message.latitude, message.longitude, message.altitude)
@@ -89,17 +77,17 @@ class Neighbours:
         # plan, after the rows of the tracks that received messages have been updated.
         self._ids: tuple[int, ...] = ()
         self._rows: dict[int, int] = {}
-        self._fresh: set[int] = set()
+        self._fresh: dict[int, tuple[Six, int, int]] = {}
         self._states: Array = np.zeros((0, 6))
         self._times = np.zeros(0, dtype=np.int64)
         # Arrival times (µs), independent of the times at which the measurements are dated.
         self._received: dict[int, int] = {}
         self._arrivals = np.zeros(0, dtype=np.int64)
-        self._clocks: dict[int, PlanClock] = {}
         left = fading(config)
         self._fading: Array = np.zeros(0) if left is None else np.ascontiguousarray(left[:, 0])
         self._max_plan_deviation = _MAX_PLAN_DEVIATION if left is None else config.guard.tube
-        self._table = HorizonTable(config.horizon.steps + 1, config.horizon.dt_us)
+        self._plans = SharedPlans(config, fleet)
+        self._table = self._plans.table
         margin = config.field.margin(2)
         self._margin: Array = np.full(_SYSTEM_IDS, margin)
         self._d_min: Array = np.full(_SYSTEM_IDS, config.field.d_min + margin)
@@ -129,8 +117,7 @@ class Neighbours:
             self._brief = value
             for track in self._tracks.values():
                 track.brief = value
-            for clock in self._clocks.values():
-                clock.brief = value
+            self._plans.brief = value
 
     def receive_position(self, now: int, message: GlobalPosition) -> None:
         """Receive a neighbour's GLOBAL_POSITION_INT; one with the own system id is ignored."""
@@ -145,7 +132,7 @@ class Neighbours:
         if track is None or self._by_autopilot[system] != by_autopilot:
             track = Track(self._config.neighbour)
             track.brief = self._brief
-        placed = _placed(self._fleet, message, self._velocity_up)
+        placed = measurement_of(self._fleet, message, self._velocity_up)
         refused, before = track.refused, track.time
         accepted = track.take(now, placed, message.time_boot)
         if not by_autopilot and (accepted or track.refused > refused):
@@ -165,14 +152,13 @@ class Neighbours:
             self._times = np.append(self._times, now)
             self._arrivals = np.append(self._arrivals, now)
         self._tracks[system], self._by_autopilot[system] = track, by_autopilot
-        self._fresh.add(system)
+        self._fresh[row] = track.last, time, self._received[system]
         self._trusted.note(now, row, track)
 
     def receive_plan(self, now: int, message: Tunnel) -> None:
         """Receive a neighbour's TUNNEL message: its horizon, or the uncertainty of its position.
 
-        A horizon in another fleet frame is refused, and so is one from the future or from long ago, unless
-        ``PlanClock`` attributes that to a wrong clock of the sender.
+        A message that cannot be used counts as refused, see ``SharedPlans.receive``.
         """
         system = message.source.system
         if system == self._system or message.payload_type not in (PAYLOAD_TYPE, DOUBT):
@@ -180,26 +166,10 @@ class Neighbours:
         try:
             if message.payload_type == DOUBT:
                 self._uncertainty.receive(now, system, message.payload)
-                return
-            origin, horizon = _read(message.payload)
+            else:
+                self._plans.receive(now, system, message.payload)
         except PlanWireError:
             self.refused_plans += 1
-            return
-        begins = None
-        if origin == self._fleet.fingerprint and len(horizon.knots) > 1:
-            clock = self._clocks.get(system)
-            if clock is None:
-                config = self._config
-                clock = PlanClock(config.neighbour.delay_us, config.guard.plan_stale_us)
-                clock.brief = self._brief
-                self._clocks[system] = clock
-            begins = clock.begins(now, horizon.epoch, horizon.dt)
-        if begins is None:
-            self.refused_plans += 1
-            return
-        if begins != horizon.epoch:
-            horizon = Horizon(begins, horizon.dt, horizon.knots)
-        self._table.put(system, horizon)
 
     def listen(self, now: int, own: State | None) -> None:
         """Determine the neighbours to ignore for a while; ``own`` is the own state at ``now`` (µs)."""
@@ -254,26 +224,26 @@ class Neighbours:
             return Obstacles((), np.empty((0, steps, 3)), np.empty(0), np.empty(0))
         positions, trusted = self._table.positions(ids, now, now - stale)
         here, silent = np.empty((len(ids), 3)), age > stale
-        _extrapolate(states, age, config.neighbour.extrapolate_us, here)
+        extrapolate(states, age, config.neighbour.extrapolate_us, here)
         count, deviation = len(ids), self._max_plan_deviation
         further: Array | None = None
         if np.count_nonzero(silent):
             # Late: a message has arrived recently, but its date is old. A neighbour that has just fallen
             # silent is not late.
             begins, late = positions[:, 0], silent & (now - arrivals <= stale - config.neighbour.delay_us)
-            beside = late & (_within(begins, states[:, 0:3], deviation) | _within(begins, here, deviation))
+            beside = late & (within(begins, states[:, 0:3], deviation) | within(begins, here, deviation))
             held = silent if config.guard.flown_on_us else late
             if np.count_nonzero(held):
                 names, further = tuple(compress(ids, held.tolist())), np.zeros(count)
                 here[held], further[held] = self._held(
                     names, states[held], times[held], age[held], late[held]
                 )
-            trusted &= beside | (~late & _within(begins, here, deviation))
+            trusted &= beside | (~late & within(begins, here, deviation))
             deviation = inf
         # A neighbour that is silent for longer than it is extrapolated rests where the extrapolation ended.
         moves = config.neighbour_prediction == "velocity"
         most, step = config.neighbour.extrapolate_us if moves else -1, 1e-6 * config.horizon.dt_us
-        _align(states, age, here, silent, deviation, self._fading, step, most, positions, trusted)
+        align(states, age, here, silent, deviation, self._fading, step, most, positions, trusted)
         found = Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count], self._margin[:count])
         if further is not None:
             further[trusted] = 0.0
@@ -366,78 +336,6 @@ class Neighbours:
         """Update the rows of the neighbours received since the last update."""
         if not self._fresh:
             return
-        rows = [self._rows[system] for system in self._fresh]
-        tracks = [self._tracks[system] for system in self._fresh]
-        self._states[rows] = [track.last for track in tracks]
-        self._times[rows] = [track.time or 0 for track in tracks]
-        self._arrivals[rows] = [self._received[system] for system in self._fresh]
+        rows = list(self._fresh)
+        self._states[rows], self._times[rows], self._arrivals[rows] = zip(*self._fresh.values(), strict=True)
         self._fresh.clear()
-
-
-def _within(planned: Array, places: Array, strayed: float) -> NDArray[np.bool_]:
-    """Return which (M,) of the ``planned`` places (M, 3) are within ``strayed`` (m) of ``places`` (M, 3)."""
-    off = planned - places
-    return np.asarray(np.vecdot(off, off) <= strayed**2)
-
-
-@kernel(VOID, array(2), array(1, INT), INT, output(2))
-def _extrapolate(states: Array, ages: Ages, most: int, here: Array) -> None:
-    """Write to ``here`` (M, 3) the present positions by the last ``states`` (M, 6), ``ages`` (M,) µs old.
-
-    They move at constant velocity for ``most`` µs and then rest.
-    """
-    for j in range(len(states)):
-        carried = 1e-6 * min(max(ages[j], 0), most)
-        for i in range(3):
-            here[j, i] = states[j, i] + carried * states[j, 3 + i]
-
-
-@kernel(
-    VOID,
-    array(2),
-    array(1, INT),
-    array(2),
-    array(1, BOOL),
-    FLOAT,
-    array(1),
-    FLOAT,
-    INT,
-    output(3),
-    output(1, BOOL),
-)
-def _align(
-    states: Array,
-    ages: Ages,
-    here: Array,
-    silent: NDArray[np.bool_],
-    deviation: float,
-    fading: Array,
-    step: float,
-    most: int,
-    positions: Array,
-    trusted: NDArray[np.bool_],
-) -> None:
-    """Replace planned ``positions`` (M, N + 1, 3) of neighbours by measured ones where plans do not count.
-
-    A plan is no longer ``trusted`` (M,) if it is further than ``deviation`` (m) from the measured place
-    ``here`` (M, 3). A vehicle beside a trusted plan returns to it by the shares ``fading`` (N + 1,); if these
-    are empty, or the vehicle is ``silent`` (M,), its plan is used as it is. Without a trusted plan a
-    neighbour rests; if its state is at most ``most`` (µs) old, it moves on at constant velocity, with
-    ``step`` (s) between positions.
-    """
-    off = np.empty(3)
-    for j in range(len(positions)):
-        square = 0.0
-        for i in range(3):
-            off[i] = here[j, i] - positions[j, 0, i]
-            square += off[i] * off[i]
-        trusted[j] = trusted[j] and square <= deviation * deviation
-        moves = ages[j] <= most
-        for n in range(positions.shape[1]):
-            for i in range(3):
-                if not trusted[j]:
-                    positions[j, n, i] = here[j, i]
-                    if moves:
-                        positions[j, n, i] += n * step * states[j, 3 + i]
-                elif not silent[j] and len(fading):
-                    positions[j, n, i] += fading[n] * off[i]

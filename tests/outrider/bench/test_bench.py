@@ -9,6 +9,7 @@ import pytest
 
 from outrider.bench import stages
 from outrider.bench.comparison import earlier, ratios
+from outrider.bench.receive import receiving
 from outrider.errors import InputError
 
 
@@ -20,6 +21,12 @@ def test_every_stage_is_timed_and_left_as_it_was() -> None:
     assert set(found["certified"]) == set(stages.CERTIFIED)
     assert all(value > 0.0 for part in found.values() for value in part.values())
     assert before == {(owner, name): getattr(owner, name) for owner, name in before}
+
+
+def test_receiving_is_timed_for_positions_and_plans() -> None:
+    found = receiving(1)
+    assert set(found) == {"position", "plan"}
+    assert all(0.0 < times["converted"] < times["whole"] for times in found.values())
 
 
 def test_figures_of_both_benchmarks_are_compared(tmp_path: Path) -> None:
