@@ -191,9 +191,10 @@ class Companion:
     def _receive(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
         """Receive the messages of ``inbox``; return the answers for the ground."""
         answers: list[Message] = []
-        self.world.neighbours.relevance.now = now
+        world, avoidance, codecs = self.world, self.avoidance, self._codecs
+        world.neighbours.relevance.now = now
         for link, data in inbox:
-            for message in self._codecs[link].feed(data, whole=True):
+            for message in codecs[link].feed(data, whole=True):
                 if link == "ground":
                     answers += self._orders.obey(message)
                     continue
@@ -202,8 +203,8 @@ class Companion:
                     if isinstance(message, Timesync):
                         self._receive_time(now, message)
                         continue
-                if not self.avoidance.receive(now, link, message):
-                    self.world.receive(now, link, message)
+                if not avoidance.receive(now, link, message):
+                    world.receive(now, link, message)
         return answers
 
     def _receive_time(self, now: int, message: Timesync) -> None:

@@ -185,7 +185,15 @@ class SenderClock:
         self.support += 1
         self._lag = lag
         self._last_lags.append(lag)
-        self._follow(received, lag, expected)
+        least = self._least
+        if self.brief or received >= least.begun + _PIECE_US or elapsed < 0:
+            self._follow(received, lag, expected)
+        else:
+            # As ``_follow``, for most messages.
+            self._received = received
+            self._line = line = float(lag) if lag < expected else expected
+            if lag < least.lag:
+                self._least = Piece(least.begun, received, lag, lag - line)
         self.skew = round(self._line) - self._delay - self._base
         return TrackTime(stamp + self._base, True)
 

@@ -93,6 +93,11 @@ class HealthMonitor:
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
         self.concerns: dict[str, Concern] = {}
+        self.blinkered = False
+        """Whether a concern about neighbours, positioning, tracking or missed deadlines is present.
+
+        Information on the others or on the own position may then be old or wrong, or the vehicle reacts late.
+        """
         self._late, self._clock_set, self._origin_moved = _ExtendedEvent(), _ExtendedEvent(), _ExtendedEvent()
         self._off_setpoints = _ExtendedEvent()
         self._clock_steps = self._moves = 0
@@ -105,16 +110,10 @@ class HealthMonitor:
         changes = [Change(concern, True) for name, concern in found.items() if name not in self.concerns]
         changes += [Change(concern, False) for name, concern in self.concerns.items() if name not in found]
         self.concerns = found
+        self.blinkered = not _CAUTION_CONCERNS.isdisjoint(found) or any(
+            name.startswith((_NEIGHBOUR_PREFIX, _NEAR_PREFIX)) for name in found
+        )
         return changes
-
-    @property
-    def blinkered(self) -> bool:
-        """Whether a concern about neighbours, positioning, tracking or missed deadlines is present.
-
-        Information on the others or on the own position may then be old or wrong, or the vehicle reacts late.
-        """
-        vague = not _CAUTION_CONCERNS.isdisjoint(self.concerns)
-        return vague or any(name.startswith((_NEIGHBOUR_PREFIX, _NEAR_PREFIX)) for name in self.concerns)
 
     # ``_judge`` collects the concerns; most of the following methods return one, or None.
 

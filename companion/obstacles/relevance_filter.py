@@ -125,9 +125,9 @@ class RelevanceFilter:
             return
         if float(np.sqrt(own.velocity @ own.velocity)) > self._max_speed:
             return
-        distance = norms(states[:, 0:3] - own.position)
-        if distance.max() <= self._relevant_distance:
+        if _all_within(states, own.position, self._relevant_distance):
             return
+        distance = norms(states[:, 0:3] - own.position)
         age = 1e-6 * np.maximum(ages, 0)
         moved = self._max_speed * (age + 1e-6 * max(own.age, 0))
         spare = distance - self._relevant_distance - moved - _MAX_PLAN_OFFSET
@@ -185,6 +185,16 @@ def _reach(
     """
     braking = closing * (closing * slowing + reaction)
     return max(d_safe + max(braking, band + reach_s * closing), least)
+
+
+@kernel(BOOL, array(2), array(1), FLOAT)
+def _all_within(states: Array, place: Array, distance: float) -> bool:
+    """Return whether all positions of ``states`` (M, 6) are within ``distance`` (m) of ``place`` (3,)."""
+    for j in range(len(states)):
+        x, y, z = states[j, 0] - place[0], states[j, 1] - place[1], states[j, 2] - place[2]
+        if not x * x + y * y + z * z <= distance * distance:
+            return False
+    return True
 
 
 _reach_of = part(_reach)

@@ -152,8 +152,10 @@ class Codec:
         return signing.sign(frame, self._link)
 
     def _next(self, source: Source) -> int:
-        if not (0 <= source[0] <= 255 and 0 <= source[1] <= 255):
-            raise EncodeError(f"source = {tuple(source)} is outside 0…255")
-        sequence = self._sequences.get(source, 0)
+        sequence = self._sequences.get(source)
+        if sequence is None:
+            if not (0 <= source[0] <= 255 and 0 <= source[1] <= 255):
+                raise EncodeError(f"source = {tuple(source)} is outside 0…255")
+            sequence = 0
         self._sequences[source] = (sequence + 1) & 0xFF
         return sequence

@@ -24,6 +24,8 @@ LONGEST_FRAME = 280  # version 2: 10 header, 255 payload, 2 checksum, 13 signatu
 STARTS = re.compile(b"[\xfd\xfe]")
 _HEADER_V1 = Struct("<6B")
 _HEADER_V2 = Struct("<7BHB")
+_CHECKED_HEADER_V2 = Struct("<6BHB")
+"""The header of version 2 without the start byte: the part that the checksum covers."""
 CRC_EXTRA: dict[int, bytes] = {
     number: bytes((kind.crc_extra,)) for number, kind in mavlink.mavlink_map.items()
 }
@@ -160,18 +162,12 @@ def frame_v2(
     ``flags``: MAVLINK_IFLAG_SIGNED if a signature will be appended.
     """
     payload = payload.rstrip(b"\0") or b"\0"
-    body = _HEADER_V2.pack(
-        mavlink.PROTOCOL_MARKER_V2,
-        len(payload),
-        flags,
-        0,
-        sequence,
-        *source,
-        message_id & 0xFFFF,
-        message_id >> 16,
+    system, component = source
+    body = _CHECKED_HEADER_V2.pack(
+        len(payload), flags, 0, sequence, system, component, message_id & 0xFFFF, message_id >> 16
     )
     body += payload
-    return body + mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")
+    return b"\xfd" + body + mcrf4xx(body + crc_extra).to_bytes(2, "little")
 
 
 def frame_v1(
@@ -225,7 +221,9 @@ class Framer:
         """Return the frames that ``data`` completes, with a correct checksum (unknown ones: unverified)."""
         if self._rest:
             data = self._rest + data
-        frames, at = leading_frames(data)
+        # As ``leading_frames``, without the call: every datagram passes here.
+        short = type(data) is bytes and len(data) <= _MAX_CACHED_BYTES
+        frames, at = _leading(data) if short else _leading.__wrapped__(data)
         if at == len(data):
             self._rest = b""
             self.frames += len(frames)
