@@ -344,8 +344,8 @@ class Autopilot:
 
     @property
     def state(self) -> VehicleState:
-        """True state, site NED."""
-        return self._plant.vehicle.state
+        """True state, site NED; it is cached, so do not modify it."""
+        return self._plant.state
 
     @property
     def wind(self) -> Vector:

@@ -6,7 +6,7 @@ reaches a value.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 
 from mavlink_bridge.errors import ScheduleError
@@ -33,17 +33,15 @@ class NodeClock:
     offset: int = 0
     drift_ppm: float = 0.0
     since: int = 0
+    _rate: int = field(init=False, repr=False, compare=False)
+    """Advance of the clock (µs) in 10⁹ µs of true time."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.drift_ppm) and abs(self.drift_ppm) <= LARGEST_DRIFT_PPM):
             raise ScheduleError(
                 f"drift = {self.drift_ppm} ppm of a clock is not within ±{LARGEST_DRIFT_PPM:.0f} ppm"
             )
-
-    @property
-    def _rate(self) -> int:
-        """Advance of the clock (µs) in 10⁹ µs of true time."""
-        return _BILLION + round(self.drift_ppm * 1000)
+        object.__setattr__(self, "_rate", _BILLION + round(self.drift_ppm * 1000))
 
     def reading(self, true: int) -> int:
         """Return what the clock shows (µs, rounded down) at ``true`` (µs)."""

@@ -58,6 +58,7 @@ class Commander:
         self._contact_since: int | None = None
         self._unlocated_since: int | None = None
         self._disarm_at = 0
+        self._disarm_delay = round(config.disarm_delay * 1e6)
         self._chosen_mode = flavour.boot_mode
         self._setpoints_lost = False
         self.doubts: Callable[[], list[str]] = list
@@ -71,6 +72,7 @@ class Commander:
         if config.takeoff_height != self._config.takeoff_height:
             self._takeoff_height = config.takeoff_height
         self._config = config
+        self._disarm_delay = round(config.disarm_delay * 1e6)
 
     def status(self, now: int) -> Status:
         """Return the inputs of decisions at ``now`` (µs)."""
@@ -318,4 +320,4 @@ class Commander:
         self._status_text.inform(why)
 
     def _restart_disarm_timer(self, now: int) -> None:
-        self._disarm_at = now + round(self._config.disarm_delay * 1e6)
+        self._disarm_at = now + self._disarm_delay

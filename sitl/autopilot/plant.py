@@ -24,6 +24,8 @@ from sitl.vehicle.multirotor import Reference, VehicleState
 # vehicle's controller extrapolates it in between. The period is rounded down to whole physics steps, but is
 # at least one of them.
 _RENEWAL_US: Final = 10_000
+_NOTHING: Final = np.zeros(3)
+_NOTHING.flags.writeable = False
 
 
 class Plant:
@@ -76,7 +78,8 @@ class Plant:
 
         The reference is renewed on a fixed grid. Without a reference the motors stop, or idle if ``armed``.
         """
-        vehicle, guidance, period, stride = self.vehicle, self._guidance, self._period, self._stride
+        vehicle, guidance, sensors = self.vehicle, self._guidance, self.sensors
+        period, stride = self._period, self._stride
         if not armed:
             # A disarmed vehicle's motors never turn, whatever the guidance requests.
             guidance.idle()
@@ -86,16 +89,17 @@ class Plant:
         while self._steps < last:
             count = min(last - self._steps, stride - self._steps % stride)
             begin, step = self._steps * period, count * period
+            exact = sensors.exact
             wind = self._air(begin)
             reference = self.course.next(step)
-            if reference is not None and not self.sensors.exact:
+            if reference is not None and not exact:
                 reference = self._shifted(reference)
             idle = armed and reference is None
             self._trace.append(vehicle.advance(count, reference, wind, idle=idle))
-            guidance.advance(begin, step, self._local(wind), self.sensors.drift)
+            guidance.advance(begin, step, self._local(wind), sensors.drift)
             self._steps += count
             self._state = self._estimate = None
-            if not self.sensors.exact:
+            if not exact:
                 self._sense()
 
     @property
@@ -124,7 +128,7 @@ class Plant:
     @property
     def estimate_error(self) -> npt.NDArray[np.float64]:
         """Estimated minus true position (3,) (m, site NED)."""
-        return np.zeros(3) if self.sensors.exact else self.sensors.deviation(self.state).position
+        return _NOTHING if self.sensors.exact else self.sensors.deviation(self.state).position
 
     @property
     def trace(self) -> npt.NDArray[np.float64]:

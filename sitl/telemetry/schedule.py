@@ -122,13 +122,18 @@ class Telemetry:
         """Return all messages due at ``now`` (µs). A late stream skips the messages that it missed."""
         builds = [self._streams[message_id].build for message_id in self._requested]
         self._requested.clear()
+        next_due = _NEVER
         for stream in self._active:
-            if stream.due <= now:
+            due = stream.due
+            if due <= now:
                 builds.append(stream.build)
-                stream.due += stream.interval
-                if stream.due <= now:
-                    stream.due += (now - stream.due) // stream.interval * stream.interval + stream.interval
-        self._schedule()
+                due += stream.interval
+                if due <= now:
+                    due += (now - due) // stream.interval * stream.interval + stream.interval
+                stream.due = due
+            if due < next_due:
+                next_due = due
+        self.next_due = next_due
         return [message for build in builds if (message := build(snapshot)) is not None]
 
     def _gather(self) -> None:

@@ -50,12 +50,12 @@ class Origin:
 
     def position_to_local(self, site: Array) -> Vector:
         """Transform a position (3,), m: site NED → local NED."""
-        x, y, z = ((site - self.position) @ self.rotation).tolist()
+        x, y, z = (site - self.position).dot(self.rotation).tolist()
         return x, y, z
 
     def vector_to_local(self, site: Array) -> Vector:
         """Transform a velocity or acceleration (3,): site NED → local NED."""
-        x, y, z = (site @ self.rotation).tolist()
+        x, y, z = site.dot(self.rotation).tolist()
         return x, y, z
 
     def local(self, latitude: float, longitude: float, altitude: float) -> Vector:

@@ -148,8 +148,9 @@ def state_of(row: FloatArray) -> VehicleState:
     The speed of a failed rotor is the remaining fraction of its motor's speed.
     """
     row = row.copy()
-    motors, left = row[STATE_SIZE:].reshape(2, -1)
-    return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], motors * left, row[13:16], row[20:23])
+    left = (STATE_SIZE + len(row)) // 2
+    rotor_speeds = row[STATE_SIZE:left] * row[left:]
+    return VehicleState(row[0:3], row[3:6], row[6:10], row[10:13], rotor_speeds, row[13:16], row[20:23])
 
 
 def checked_rotor(config: VehicleConfig, index: int, left: float) -> None:

@@ -34,7 +34,7 @@ class MotionObserver:
         self._autopilots = autopilots
         self._last = -1
         self._next = 0
-        self._pending: list[list[Array]] = [[] for _ in autopilots]
+        self._pending: list[Array] = []
         self._times: list[int] = []
 
     def see(self, now: int) -> Motions | None:
@@ -46,17 +46,19 @@ class MotionObserver:
         if not len(times):
             return None
         self._last = moved_to
-        for autopilot, pending in zip(self._autopilots, self._pending, strict=True):
-            trace = autopilot.trace
-            pending.append(trace if autopilot.airborne else np.full_like(trace, np.nan))
+        traces = np.concatenate([autopilot.trace for autopilot in self._autopilots])
+        tracks = traces.reshape(len(self._autopilots), -1, 3)
+        standing = [k for k, autopilot in enumerate(self._autopilots) if not autopilot.airborne]
+        if standing:
+            tracks[standing] = np.nan
+        self._pending.append(tracks)
         self._times += times.tolist()
         if now < self._next:
             return None
         self._next = now + SAMPLE
-        track = ned_to_enu(np.stack([np.concatenate(pending) for pending in self._pending], axis=1))
+        track = ned_to_enu(np.concatenate(self._pending, axis=1).swapaxes(0, 1))
         motions = Motions(self._times, track, rows(self._autopilots))
-        for pending in self._pending:
-            pending.clear()
+        self._pending.clear()
         self._times = []
         return motions
 
@@ -86,17 +88,16 @@ def places(target: Placed, times: Iterable[int]) -> Array:
 
 def rows(autopilots: Sequence[Autopilot]) -> Array:
     """Return the samples (K, ROW) of the vehicles, ENU; columns: see ``ground_truth.ROW``."""
-    ned = np.empty((len(autopilots), 5, 3))
-    attitude = np.empty((len(autopilots), 4))
-    for k, autopilot in enumerate(autopilots):
+    vectors: list[Array] = []
+    attitudes: list[Array] = []
+    for autopilot in autopilots:
         state, reference = autopilot.state, autopilot.reference
-        ned[k, 0], ned[k, 1], ned[k, 2] = state.position, state.velocity, state.acceleration
-        ned[k, 3] = NOWHERE if reference is None else reference.position
-        ned[k, 4] = autopilot.estimate_error
-        attitude[k] = state.attitude
+        place = NOWHERE if reference is None else reference.position
+        vectors += (state.position, state.velocity, state.acceleration, place, autopilot.estimate_error)
+        attitudes.append(state.attitude)
     result = np.empty((len(autopilots), ROW))
-    result[:, :15] = ned_to_enu(ned).reshape(-1, 15)
-    w, x, y, z = attitude.T
+    result[:, :15] = ned_to_enu(np.concatenate(vectors).reshape(-1, 3)).reshape(-1, 15)
+    w, x, y, z = np.concatenate(attitudes).reshape(-1, 4).T
     yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     result[:, 15] = [yaw_to_enu(angle) for angle in yaw.tolist()]
     # Tilt: the angle between the vertical axes of body and world.
