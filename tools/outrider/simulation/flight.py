@@ -141,6 +141,7 @@ class Flight:
         if own is None:
             return False
         self._reports = self._team.reports()
+        self._vehicles.synchronise()
         parts = [own, *(report.part for report in self._reports)]
         self._observer.take(now, [part.motions for part in parts])
         start = conductor.clock_start

@@ -242,7 +242,9 @@ def _work(
             part = vehicles.see(now)
             if part is None:
                 return False
+            # Both messages at once: the leader needs the report, and does not wait twice for this process.
             end.send(Report(part, vehicles.snapshots(now) if watched else []))
+            vehicles.synchronise()
             instructions: Instructions = end.recv()
             obey(vehicles, now, instructions)
             return instructions.over

@@ -124,6 +124,9 @@ class Vehicles:
         """
         nodes = [*self._schedule(), *others]
         elsewhere = {entry.node.name for entry in nodes} - self._own
+        if not self._events:
+            # Samples are at ticks of every process; only events need the ticks of nodes elsewhere, too.
+            nodes = [entry for entry in nodes if entry.node.name in self._own]
         with ExitStack() as files, seldom_collected():
             if self._directory is not None:
                 taps = [*taps, Recorder(self._directory, self.systems, files)]
@@ -145,12 +148,11 @@ class Vehicles:
     def see(self, now: int) -> Part | None:
         """Return the state of the vehicles if a sample is due at ``now`` (µs).
 
-        At a sample the processes exchange datagrams.
+        At every sample the processes have to ``synchronise``.
         """
         motions = self._observer.see(now)
         if motions is None:
             return None
-        self._synchronise()
         waiting = tuple(
             f"{c.name} waits for {c.pilot.waiting_for}" + (f" ({c.pilot.said})" if c.pilot.said else "")
             for c in self.companions
@@ -160,6 +162,10 @@ class Vehicles:
             a.armed for s, a in zip(self.systems, self.autopilots, strict=True) if s not in self._vanished
         )
         return Part(motions, waiting, armed)
+
+    def synchronise(self) -> None:
+        """Exchange datagrams with the other processes."""
+        self.network.admit(self._exchange(self.network.outgoing()))
 
     def snapshots(self, now: int) -> list[VehicleSnapshot]:
         """Return the snapshots of the vehicles at ``now`` (µs), without a change of their states."""
@@ -216,14 +222,10 @@ class Vehicles:
             while self._events and self._events[0].after <= now - self._start:
                 self._strike(self._events.popleft(), computers)
 
-    def _synchronise(self) -> None:
-        """Exchange datagrams with the other processes."""
-        self.network.admit(self._exchange(self.network.outgoing()))
-
     def _strike(self, event: Event, computers: _Computers) -> None:
         if isinstance(event.what, PartitionPart):
             # A datagram that was sent before a cut still arrives.
-            self._synchronise()
+            self.synchronise()
         strike_computer(event, computers)
         if isinstance(event.what, PartitionPart):
             return
