@@ -5,6 +5,7 @@ It holds the separation at every physics step, and samples at 50 Hz of all that 
 
 from __future__ import annotations
 
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,8 @@ NOWHERE = np.full(3, np.nan)
 NOWHERE.flags.writeable = False
 _BATCH_DISTANCES = 10_000
 """Approximate number of distances above which the collected samples are processed."""
+_CHUNK_DISTANCES = 5_000
+"""Number of distances computed at a time: their differences fit the processor's cache."""
 
 
 class Samples(NamedTuple):
@@ -71,7 +74,7 @@ class Encounters:
 
     def see(self, distances: Array) -> None:
         """Process distances (n, pairs) at consecutive times; NaN where a pair is not in the air."""
-        least = float(np.fmin.reduce(distances, axis=None, initial=np.inf))
+        least = _least(distances)
         self.minimum = min(self.minimum, least)
         if least < self._least or self._below.any():
             below = np.vstack([self._below, distances < self._least])
@@ -150,11 +153,10 @@ class GroundTruth:
             return
         lengths = [len(track) for track in self._tracks]
         track = np.concatenate(self._tracks)
-        apart = track[:, self._pairs[0]] - track[:, self._pairs[1]]
-        distance = np.sqrt(np.einsum("tpi,tpi->tp", apart, apart))
+        distance = _distances(track, *self._pairs)
         self._vehicles.see(distance)
-        least = np.fmin.reduce(distance, axis=1, initial=np.inf)
-        self._least += [float(part.min(initial=np.inf)) for part in np.split(least, np.cumsum(lengths)[:-1])]
+        parts = pairwise(accumulate(lengths, initial=0))
+        self._least += [_least(distance[begin:end]) for begin, end in parts]
         if self._target_counts:
             off = track - np.concatenate(self._places)[:, None]
             self._target.see(np.sqrt(np.einsum("tki,tki->tk", off, off)))
@@ -194,3 +196,20 @@ class GroundTruth:
             np.array([row[4] for row in chosen]),
             np.array([row[3] for row in chosen]) if chosen else np.empty((0, self._moves, 3)),
         )
+
+
+def _distances(track: Array, one: NDArray[np.int64], other: NDArray[np.int64]) -> Array:
+    """Return the distances (n, pairs), m, of the vehicles ``one`` and ``other`` (pairs,) in ``track``."""
+    found = np.empty((len(track), len(one)))
+    rows = max(1, _CHUNK_DISTANCES // max(1, len(one)))
+    for first in range(0, len(track), rows):
+        part = track[first : first + rows]
+        apart = part.take(one, axis=1)
+        apart -= part.take(other, axis=1)
+        np.einsum("tpi,tpi->tp", apart, apart, out=found[first : first + rows])
+    return np.sqrt(found, out=found)
+
+
+def _least(distances: Array) -> float:
+    """Return the least of ``distances`` without the missing ones (NaN); infinite if there is none."""
+    return float(np.fmin.reduce(distances, axis=None, initial=np.inf))
