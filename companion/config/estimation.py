@@ -12,7 +12,7 @@ Micros = Annotated[int, Field(gt=0, le=10_000_000, multiple_of=4)]
 
 
 class TrackConfig(Settings):
-    """Track of one sender, filtered by filterpy."""
+    """Track of one sender, filtered by a Kalman filter."""
 
     sigma_position: Positive = Field(0.02, description="m")
     sigma_velocity: Positive = Field(0.05, description="m/s")

@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from companion.config.estimation import TrackConfig
-from companion.estimation.kalman_gains import Noise, Square, gain, prepared
+from companion.estimation.kalman_gains import Noise, Square, gain
 from companion.estimation.turn_rate import Turn, TurnFilter
 
 Six = tuple[float, float, float, float, float, float]
@@ -76,7 +76,6 @@ class Estimator:
 
     def __init__(self, config: TrackConfig) -> None:
         self._noise = Noise(config.sigma_position, config.sigma_velocity, config.sigma_acceleration)
-        prepared(self._noise)
         self._noise_no_velocity = self._noise._replace(velocity=_NO_VELOCITY_SIGMA)
         self._first: Square = (config.sigma_position**2, 0.0, 0.0, config.sigma_velocity**2)
         self._first_no_velocity: Square = (config.sigma_position**2, 0.0, 0.0, _UNKNOWN_VELOCITY_SIGMA**2)

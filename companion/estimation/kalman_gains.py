@@ -1,14 +1,17 @@
-"""filterpy's Kalman filter of one axis: covariance after a step, and gain.
+"""Kalman filter of one axis: covariance after a step, and gain.
 
 Both depend on the noise and the intervals, not on the measured values. They converge within a few seconds for
 a sender with a constant rate; after a lost message the same few values occur again. Therefore they are
 cached.
+
+The filter is written here because filterpy imports scipy.stats, which takes more time and memory than all
+other imports of a companion; the tests compare both.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +19,7 @@ from companion.values.horizon import Array
 
 Square = tuple[float, float, float, float]
 """A matrix (2, 2), row by row."""
+_IDENTITY: Array = np.eye(2)
 
 
 class Noise(NamedTuple):
@@ -40,15 +44,22 @@ class Gain(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def gain(noise: Noise, P: Square, elapsed: int) -> Gain:
-    """Compute the gain for a position and velocity measured ``elapsed`` µs after the covariance was ``P``."""
-    kalman = prepared(noise)
-    kalman.P = np.array(P).reshape(2, 2)
+    """Compute the gain for a position and velocity measured ``elapsed`` µs after the covariance was ``P``.
+
+    Prediction P = F P Fᵀ + Q; with H = I innovation S = P + R, gain K = P S⁻¹, and Joseph's form of the
+    update, P = (I − K) P (I − K)ᵀ + K R Kᵀ. filterpy computes the same bits.
+    """
+    prior = np.array(P).reshape(2, 2)
     if elapsed > 0:
         F, Q = model(elapsed, noise.acceleration)
-        kalman.predict(F=F, Q=Q)
-    kalman.update(np.zeros(2))
-    (s, t), (_, u) = kalman.S.tolist()
-    return Gain((s, t, u), _row_by_row(kalman.K), _row_by_row(kalman.P))
+        prior = np.dot(np.dot(F, prior), F.T) + Q
+    R = np.diag([noise.position**2, noise.velocity**2])
+    S = prior + R
+    K = np.dot(prior, _inverse(S))
+    kept = _IDENTITY - K
+    posterior = np.dot(np.dot(kept, prior), kept.T) + np.dot(np.dot(K, R), K.T)
+    (s, t), (_, u) = S.tolist()
+    return Gain((s, t, u), _row_by_row(K), _row_by_row(posterior))
 
 
 @lru_cache(maxsize=1024)
@@ -60,24 +71,6 @@ def model(elapsed: int, sigma: float) -> tuple[Array, Array]:
         np.array([[1.0, dt], [0.0, 1.0]]),
         np.array([[q * dt * dt / 3.0, q * dt / 2.0], [q * dt / 2.0, q]]),
     )
-
-
-@lru_cache(maxsize=64)
-def prepared(noise: Noise) -> Any:
-    """Return the configured filter.
-
-    It is shared by all callers with the same ``noise``. The first call loads filterpy, which takes time:
-    call this before time-critical work begins.
-    """
-    # filterpy also imports scipy.stats, which takes longer than the rest of a companion's start.
-    from filterpy.kalman import KalmanFilter
-
-    kalman = KalmanFilter(dim_x=2, dim_z=2)
-    kalman.x = np.zeros(2)
-    kalman.H = np.eye(2)
-    kalman.R = np.diag([noise.position**2, noise.velocity**2])
-    kalman.inv = _inverse
-    return kalman
 
 
 def _inverse(S: Array) -> Array:

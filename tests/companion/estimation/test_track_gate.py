@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from companion.config import CompanionConfig
 from companion.config.estimation import TrackConfig
 from companion.estimation.estimator import Estimator
-from companion.estimation.kalman_gains import model
+from companion.estimation.kalman_gains import Noise, _inverse, gain, model
 from companion.estimation.tracks import Track
 from tests.companion.rig import LAWS, QUICK, numbers, vectors
 
@@ -28,6 +28,30 @@ def test_the_model_is_filterpys(elapsed, sigma):
     dt = elapsed * 1e-6
     np.testing.assert_allclose(Q, Q_continuous_white_noise(2, dt, sigma**2), rtol=1e-9)
     np.testing.assert_array_equal(F, [[1.0, dt], [0.0, 1.0]])
+
+
+@LAWS
+@given(
+    noise=st.builds(Noise, numbers(0.01, 3.0), numbers(0.01, 3.0) | st.just(1e4), numbers(0.1, 10.0)),
+    elapsed=st.lists(st.integers(0, 10_000_000), min_size=1, max_size=10),
+)
+def test_gains_and_covariances_are_the_bits_of_filterpy(noise, elapsed):
+    theirs = KalmanFilter(dim_x=2, dim_z=2)
+    theirs.x, theirs.H = np.zeros(2), np.eye(2)
+    theirs.R = np.diag([noise.position**2, noise.velocity**2])
+    theirs.inv = _inverse
+    theirs.P = theirs.R
+    P = tuple(theirs.P.ravel().tolist())
+    for step in elapsed:
+        if step:
+            F, Q = model(step, noise.acceleration)
+            theirs.predict(F=F, Q=Q)
+        theirs.update(np.zeros(2))
+        ours = gain(noise, P, step)
+        assert tuple(theirs.K.ravel().tolist()) == ours.K
+        assert tuple(theirs.P.ravel().tolist()) == ours.P
+        assert (theirs.S[0, 0], theirs.S[0, 1], theirs.S[1, 1]) == ours.S
+        P = ours.P
 
 
 @QUICK

@@ -17,7 +17,7 @@ from outrider.resources import config_root
 
 _PACKAGES = ("companion", "mavlink_bridge", "outrider", "sitl")
 _LENGTH = 16
-_OTHERS = ("outrider", "numpy", "scipy", "numba", "piqp", "jsbsim", "filterpy", "pymavlink", "pymap3d")
+_OTHERS = ("outrider", "numpy", "numba", "piqp", "jsbsim", "pymavlink", "pymap3d")
 
 
 def versions() -> dict[str, str]:
