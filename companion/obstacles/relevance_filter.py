@@ -41,7 +41,6 @@ from companion.values.compiled import (
     INT,
     VOID,
     array,
-    elementwise,
     kernel,
     output,
     part,
@@ -90,7 +89,7 @@ class RelevanceFilter:
             band.reach_s,
             config.approach_angle.reach + FADING,
         )
-        self._relevant_distance = float(self._reach(self._closing)) + self._closing * self._horizon_s
+        self._relevant_distance = _reach(self._closing, *self._reach_terms) + self._closing * self._horizon_s
         self._landing_distance = config.guard.landing_clearance + config.field.margin(2)
         self._use_all = False
         self._ignored_until: dict[int, int] = {}
@@ -166,22 +165,15 @@ class RelevanceFilter:
         )
         return near
 
-    def _reach(self, closing: Array | float) -> Array:
-        """Return the distance (m, between centres) within which one vehicle affects the plan of the other.
-
-        ``closing`` (m/s): their closing speed.
-        """
-        result: Array = _reaches(np.asarray(closing, dtype=np.float64), *self._reach_terms)
-        return result
-
 
 def _reach(
     closing: float, d_safe: float, slowing: float, reaction: float, band: float, reach_s: float, least: float
 ) -> float:
-    """Return ``RelevanceFilter._reach`` at the speed ``closing`` (m/s).
+    """Return the distance (m, between centres) within which one vehicle affects the plan of the other.
 
-    ``slowing`` is 1/(2 ``field.braking``), s²/m; ``reaction`` (s) is that of the field; ``band`` (m) and
-    ``reach_s`` (s) are those of the tangential band; ``least`` (m) is the reach of the approach angles.
+    ``closing`` (m/s) is their closing speed; ``slowing`` is 1/(2 ``field.braking``), s²/m; ``reaction`` (s)
+    is that of the field; ``band`` (m) and ``reach_s`` (s) are those of the tangential band; ``least`` (m) is
+    the reach of the approach angles.
     """
     braking = closing * (closing * slowing + reaction)
     return max(d_safe + max(braking, band + reach_s * closing), least)
@@ -198,7 +190,6 @@ def _all_within(states: Array, place: Array, distance: float) -> bool:
 
 
 _reach_of = part(_reach)
-_reaches = elementwise(7)(_reach)
 
 
 @kernel(

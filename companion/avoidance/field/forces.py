@@ -23,7 +23,7 @@ from math import cos, pi, sin, sqrt, tan
 
 import numpy as np
 
-from companion.values.compiled import BOOL, FLOAT, VOID, array, elementwise, kernel, output, part
+from companion.values.compiled import BOOL, FLOAT, VOID, array, kernel, output, part
 from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
 
@@ -34,7 +34,8 @@ _NEAR = 1e-6
 _HALF_TURN = 0.5 * pi
 
 
-def _hyperbolic(distance: float, d_min: float, d_safe: float, gain: float, clamp: float) -> float:
+@part
+def _magnitude(distance: float, d_min: float, d_safe: float, gain: float, clamp: float) -> float:
     """Return F_hyp(d): 0 from d_safe on, continuous and decreasing, and ``clamp`` at and below d_min."""
     width = d_safe - d_min
     z = min(max(_HALF_TURN * (distance - d_min) / width, 1e-9), _HALF_TURN)
@@ -42,14 +43,21 @@ def _hyperbolic(distance: float, d_min: float, d_safe: float, gain: float, clamp
     return max(force, 0.0)
 
 
-_magnitude = part(_hyperbolic)
-_magnitudes = elementwise(5)(_hyperbolic)
-
-
 def magnitude(distance: Array, d_min: Array, d_safe: Array, gain: float, clamp: float) -> Array:
     """Return F_hyp(d), m/s², eq. (9), of arrays that broadcast."""
-    result: Array = _magnitudes(distance, d_min, d_safe, gain, clamp)
-    return result
+    distance, d_min, d_safe = np.broadcast_arrays(distance, d_min, d_safe)
+    found = np.empty(distance.shape)
+    _magnitudes(distance.ravel(), d_min.ravel(), d_safe.ravel(), gain, clamp, found.reshape(-1))
+    return found
+
+
+@kernel(VOID, array(1), array(1), array(1), FLOAT, FLOAT, output(1))
+def _magnitudes(
+    distance: Array, d_min: Array, d_safe: Array, gain: float, clamp: float, found: Array
+) -> None:
+    """Write ``magnitude`` to ``found``; all arrays are (n,)."""
+    for n in range(len(found)):
+        found[n] = _magnitude(distance[n], d_min[n], d_safe[n], gain, clamp)
 
 
 def repulsion(
