@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 from multiprocessing.process import BaseProcess
 from typing import Final
@@ -26,7 +27,13 @@ class ChildProcess:
         self._killed = False
 
     def start(self) -> int:
-        """Start the process and return its process id."""
+        """Start the process and return its process id.
+
+        All objects are frozen before: a garbage collection in either process would write to the pages of
+        each of them, which both processes share.
+        """
+        gc.collect()
+        gc.freeze()
         self._process.start()
         return self._process.pid or 0
 
