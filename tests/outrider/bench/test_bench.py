@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from outrider.bench import stages
+from outrider.bench import stages, start
 from outrider.bench.comparison import earlier, ratios
 from outrider.bench.receive import receiving
 from outrider.errors import InputError
@@ -49,3 +49,13 @@ def test_a_file_that_is_no_benchmark_is_refused(text: str, tmp_path: Path) -> No
 def test_a_file_that_does_not_exist_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         earlier(tmp_path / "none.json")
+
+
+@pytest.mark.slow
+def test_a_start_of_fly_is_measured_in_both_processes() -> None:
+    """The limit of memory holds with every optional package installed."""
+    start.measured()
+    figures = start.measured()
+    assert figures["cpu_s"] > 0.1
+    assert figures["largest_mib"] < 2.0 * figures["memory_mib"]
+    assert 50.0 < figures["memory_mib"] <= 200.0

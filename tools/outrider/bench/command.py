@@ -20,7 +20,7 @@ from mavlink_bridge.wire.codec import Codec
 from outrider.bench import certified as bench_certified
 from outrider.bench import field as bench_field
 from outrider.bench import receive as bench_receive
-from outrider.bench import stages
+from outrider.bench import stages, start
 from outrider.bench import tlog as bench_tlog
 from outrider.resources import config_root, find
 from outrider.scenarios.options import Options
@@ -46,6 +46,7 @@ def measure(progress: Progress, *, quick: bool) -> dict[str, object]:
     figures: dict[str, object] = {
         "plan_step_ms": {"field": _levels(steps), "certified": _levels(bench_certified.plan_step(rounds))},
         "piqp_ms": _levels(qps),
+        "fly_start": start.fastest(),
         "piqp_share": round(float(np.median(qps) / np.median(steps)), 3),
         "whole_qps_ms": _levels(whole_qps),
         "stages_us": by_stage,
