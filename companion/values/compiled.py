@@ -14,6 +14,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 from numba import types
+from numba.core.caching import FunctionCache
 
 
 def _load_array_functions() -> None:
@@ -59,17 +60,52 @@ def kernel(result: Any, *arguments: Any) -> Callable[[_F], _F]:
     """Compile a function for these types; a division by zero gives inf or NaN as in NumPy.
 
     An argument of another type is a TypeError. The machine code is stored if numba finds a directory for it.
-    A read-only system without a home directory has none, and compiles at each start.
+    A read-only system without a home directory has none, and compiles at each start. Stored code that cannot
+    be read, as after a loss of power, is replaced; where there is no room for it, it is not stored.
     """
     signature = result(*arguments)
 
     def compiled(function: _F) -> _F:
+        def compile_(*, stored: bool) -> Any:
+            return numba.njit(signature, error_model="numpy", cache=stored)(function)
+
+        # A damaged file may raise any error while numba reads it.
         try:
-            return cast(_F, numba.njit(signature, error_model="numpy", cache=True)(function))
-        except RuntimeError:
-            return cast(_F, numba.njit(signature, error_model="numpy")(function))
+            found = compile_(stored=True)
+        except Exception:
+            try:
+                cast(Any, FunctionCache)(function).flush()
+                found = compile_(stored=True)
+            except Exception:
+                found = compile_(stored=False)
+        if not found.stats.cache_hits:
+            _report(found.stats.cache_path)
+        return cast(_F, found)
 
     return compiled
+
+
+_receivers: list[Callable[[str], None]] = []
+
+
+def report_compilation(to: Callable[[str], None]) -> None:
+    """Call ``to`` with a text, once, if a kernel is compiled because it was not stored.
+
+    This must be called before the modules with kernels are imported.
+    """
+    _receivers.append(to)
+
+
+def _report(stored_in: str | None) -> None:
+    where = (
+        "no directory can be written, so every start compiles: set NUMBA_CACHE_DIR to one that can"
+        if stored_in is None
+        else "later starts load the result"
+    )
+    while _receivers:
+        _receivers.pop()(
+            f"compiling the planner: a quarter of a minute, on a small computer a minute or more; {where}"
+        )
 
 
 def part(function: _F) -> _F:

@@ -58,6 +58,9 @@ def swarm(
     as_json: AsJson = False,
 ) -> None:
     """Fly a scenario, in lock-step by default, and write logs, summary and picture to a run directory."""
+    from outrider.terminal.compilation import say_if_compiling
+
+    say_if_compiling()
     from outrider.errors import Fault, InputError
     from outrider.report.command import NAME, make, write
     from outrider.runs.summary import exit_status
@@ -235,6 +238,9 @@ def fly(
     It runs until the vehicle has landed, or until Ctrl-C, which leaves the vehicle holding its position.
     Orders are typed: go, hold, return, land (docs/fly.md).
     """
+    from outrider.terminal.compilation import say_if_compiling
+
+    say_if_compiling()
     from outrider.fly.command import run
     from outrider.fly.request import Options, checked
 

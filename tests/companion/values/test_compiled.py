@@ -1,0 +1,82 @@
+"""Stored kernels: a start loads them, and works where they are damaged or cannot be stored."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+MODULE = """
+from companion.values.compiled import FLOAT, kernel, report_compilation
+
+report_compilation(print)
+
+
+@kernel(FLOAT, FLOAT)
+def twice(x):
+    return 2.0 * x
+
+
+print("twice", twice(4.0), "loaded" if twice.stats.cache_hits else "compiled")
+"""
+READ_ONLY = """
+import tempfile
+
+
+def refused(**_):
+    raise OSError(30, "Read-only file system")
+
+
+tempfile.TemporaryFile = refused
+"""
+FULL = """
+from numba.core.caching import IndexDataCacheFile
+
+
+def refused(*_):
+    raise OSError(28, "No space left on device")
+
+
+IndexDataCacheFile._open_for_write = refused
+"""
+
+
+def start(folder: Path, before: str = "") -> list[str]:
+    """Run the module in ``folder`` as a process, after the code ``before``; return its lines."""
+    (folder / "kernels.py").write_text(MODULE)
+    command = [sys.executable, "-c", f"{before}\nimport kernels"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()
+
+
+def test_the_second_start_loads_and_says_nothing(tmp_path: Path) -> None:
+    said, result = start(tmp_path)
+    assert said.startswith("compiling the planner")
+    assert said.endswith("later starts load the result")
+    assert result == "twice 8.0 compiled"
+    assert start(tmp_path) == ["twice 8.0 loaded"]
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_a_damaged_store_is_replaced(suffix: str, share: float, tmp_path: Path) -> None:
+    start(tmp_path)
+    (stored,) = tmp_path.rglob(f"*.{suffix}")
+    whole = stored.read_bytes()
+    stored.write_bytes(whole[: int(share * len(whole))])
+    assert start(tmp_path)[-1] == "twice 8.0 compiled"
+    assert start(tmp_path) == ["twice 8.0 loaded"]
+
+
+def test_a_read_only_system_compiles_at_each_start_and_says_so(tmp_path: Path) -> None:
+    for _ in range(2):
+        said, result = start(tmp_path, READ_ONLY)
+        assert "every start compiles: set NUMBA_CACHE_DIR" in said
+        assert result == "twice 8.0 compiled"
+
+
+def test_a_full_disk_stores_nothing(tmp_path: Path) -> None:
+    assert start(tmp_path, FULL)[-1] == "twice 8.0 compiled"
+    assert not list(tmp_path.rglob("*.nbc"))
