@@ -131,3 +131,21 @@ def test_a_fault_in_another_process_is_told(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr("outrider.simulation.team.obey", broken)
     with pytest.raises(OutriderError, match=r"(?s)process 1 of 2 of the flight failed.*for the test"):
         flown(scenario("antipodal-8", **SHORT), 2, tmp_path / "broken")
+
+
+def test_a_process_that_cannot_start_ends_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    fork, children = os.fork, []
+
+    def scarce() -> int:
+        if children:
+            raise BlockingIOError(11, "Resource temporarily unavailable")
+        child = fork()
+        children.append(child)
+        return child
+
+    flight = Flight(scenario("antipodal-8", **SHORT), FIREFLY, 3, LOGS, processes=3)
+    monkeypatch.setattr(os, "fork", scarce)
+    with pytest.raises(BlockingIOError):
+        flight.run()
+    with pytest.raises(ChildProcessError):
+        os.waitpid(children[0], os.WNOHANG)

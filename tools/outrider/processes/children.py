@@ -37,10 +37,11 @@ class Children:
 
     def join(self, within: float) -> None:
         """Resume all processes, wait for them, and kill those that do not end ``within`` seconds."""
-        for name in self._processes:
+        started = {name: process for name, process in self._processes.items() if process.pid is not None}
+        for name in started:
             self.thaw(name)
         until = time.monotonic() + within
-        for process in self._processes.values():
+        for process in started.values():
             process.join(max(until - time.monotonic(), 0.1))
             if process.is_alive():
                 process.kill()

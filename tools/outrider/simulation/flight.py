@@ -84,8 +84,8 @@ class Flight:
         Raises OutriderError if another process of the flight fails.
         """
         others = schedule(self.scenario, self.target, *self.moving, self.operator)
-        self._team.start()
         try:
+            self._team.start()
             self._vehicles.run(others, self._watch, taps, reverse=self._reverse)
             self._others = self._team.results()
         finally:
