@@ -10,9 +10,11 @@ from types import TracebackType
 from typing import Final, Self
 
 _MIN_NEW: Final = 700
-"""Number of new containers below which nothing is collected: the default threshold of CPython 3.11."""
-_MAX_NEW: Final = 100 * _MIN_NEW
-"""Number of new containers above which a collection takes place without enough idle time."""
+"""Number of new containers from which they are collected: the default threshold of CPython 3.11."""
+_CALLS: Final = 25
+"""Number of calls after which new containers are collected, however few they seem."""
+_MOST: Final = 100.0
+"""Multiple of ``_MIN_NEW`` or ``_CALLS`` from which a collection takes place without enough idle time."""
 _TIME_MARGIN: Final = 3
 _SELDOM_THRESHOLDS: Final = (200 * _MIN_NEW, 10, 10)
 
@@ -23,16 +25,21 @@ class IdleCollector:
     On entry all existing objects are frozen (``gc.freeze``) and automatic collection is switched off.
     ``idle`` collects within the free time that it receives. On exit the previous state is restored.
 
-    Every tenth collection is of generation 1, every hundredth of generation 2, the others of generation 0. A
-    collection requires free time of at least 3 times the longest one of its generation so far. A loop that is
-    never idle long enough collects nevertheless once 70 000 new containers exist.
+    A collection follows 700 new containers or 25 calls. The calls count because a container that is deleted
+    reduces the number of new ones, however old it is: where caches are full, that number hardly grows.
+
+    Every tenth collection is due in generation 1, every hundredth in generation 2, the others in 0. A
+    generation requires free time of at least 3 times what it may take, by the longest ones so far and by what
+    has come since. Without that time it remains due, and a younger one is collected in its place; otherwise
+    even generation 0 would grow until it takes too long. A loop that is never idle long enough collects
+    generation 0 nevertheless after 70 000 new containers or 2500 calls.
     """
 
     def __init__(self) -> None:
         self.collections = 0
-        # µs of CPU time by generation; initial estimates, which only grow.
-        self._longest = [200, 500, 2000]
-        self._runs = 0
+        # µs of CPU time, initial estimates which only grow: of generation 0 per 700 containers or 25 calls.
+        self._longest = [200.0, 500.0, 2000.0]
+        self._runs = self._calls = self._aged = 0
         self._enabled = False
 
     def __enter__(self) -> Self:
@@ -51,18 +58,25 @@ class IdleCollector:
 
     def idle(self, free: int) -> None:
         """Collect if ``free`` (µs of idle time, negative if a step is overdue) suffices."""
-        new = gc.get_count()[0]
-        if new < _MIN_NEW:
+        self._calls += 1
+        size = max(gc.get_count()[0] / _MIN_NEW, self._calls / _CALLS)
+        if size < 1.0:
             return
-        generation = 2 if self._runs % 100 == 99 else 1 if self._runs % 10 == 9 else 0
-        if free < _TIME_MARGIN * self._longest[generation] and new < _MAX_NEW:
+        due = 2 if self._runs % 100 == 99 else 1 if self._runs % 10 == 9 else 0
+        youngest, middle, oldest = self._longest
+        expected = (size * youngest, middle, oldest + self._aged * middle)
+        fits = [generation for generation in range(due + 1) if free >= _TIME_MARGIN * expected[generation]]
+        if not fits and size < _MOST:
             return
+        generation = max(fits, default=0)
         # CPU time: a single preemption by another process does not predict the next collection.
         started = time.thread_time_ns()
         gc.collect(generation)
-        took = (time.thread_time_ns() - started) // 1000
+        took = 1e-3 * (time.thread_time_ns() - started) / (1.0 if generation else size)
         self._longest[generation] = max(self._longest[generation], took)
-        self._runs += 1
+        self._aged = 0 if generation == 2 else self._aged + generation
+        self._calls = 0
+        self._runs += generation == due
         self.collections += 1
 
 

@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+import time
 import weakref
 
 import pytest
@@ -184,3 +185,38 @@ print(granted.realtime, policy == os.SCHED_FIFO, parameters.sched_priority, gran
     assert realtime == fifo
     assert int(level) == (LEVEL if fifo == "True" else 0)
     assert ("SCHED_FIFO" in told) == (fifo == "True")
+
+
+def test_an_older_generation_without_time_does_not_hold_up_the_youngest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock, taken = [0], []
+
+    def collect(generation: int = 2) -> int:
+        taken.append(generation)
+        clock[0] += 10_000_000 if generation else 100_000
+        return 0
+
+    monkeypatch.setattr(gc, "collect", collect)
+    monkeypatch.setattr(gc, "get_count", lambda: (1000, 0, 0))
+    monkeypatch.setattr(time, "thread_time_ns", lambda: clock[0])
+    with IdleCollector() as collector:
+        taken.clear()
+        for _ in range(300):
+            collector.idle(9_000)
+    assert taken.count(1) == 1
+    assert taken.count(0) == 299
+
+
+def test_containers_are_collected_however_few_seem_to_be_new(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each deletion of an old container reduces the number of new ones."""
+    with IdleCollector() as collector:
+        monkeypatch.setattr(gc, "get_count", lambda: (0, 0, 0))
+        for _ in range(100):
+            collector.idle(10**9)
+        assert collector.collections == 4
+        for _ in range(2499):
+            collector.idle(-1)
+        assert collector.collections == 4
+        collector.idle(-1)
+        assert collector.collections == 5
