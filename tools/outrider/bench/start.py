@@ -17,7 +17,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -50,8 +50,9 @@ def fastest() -> dict[str, float]:
 def measured() -> dict[str, float]:
     """Start the command once and return its figures; empty where the system has no /proc.
 
-    ``cpu_s``: CPU time of all processes (s). ``memory_mib``: their resident memory, pages that several of
-    them share counted once (Pss). ``largest_mib``: resident memory (Rss) of the larger process.
+    ``cpu_s``: CPU time of all processes (s). ``memory_mib``: their resident memory; pages that they share
+    count once, that is the anonymous pages of all (Pss_Anon) and the pages of files of the process that has
+    most of them. ``largest_mib``: resident memory (Rss) of the larger process.
     """
     if not Path("/proc/self/smaps_rollup").exists():
         return {}
@@ -65,8 +66,8 @@ def measured() -> dict[str, float]:
             memory = [_memory(pid) for pid in family]
     return {
         "cpu_s": ticks / os.sysconf("SC_CLK_TCK"),
-        "memory_mib": round(sum(pss for pss, _ in memory), 1),
-        "largest_mib": round(max(rss for _, rss in memory), 1),
+        "memory_mib": round(sum(one.own for one in memory) + max(one.files for one in memory), 1),
+        "largest_mib": round(max(one.resident for one in memory), 1),
     }
 
 
@@ -115,8 +116,15 @@ def _ticks(pid: int) -> int:
     return int(fields[11]) + int(fields[12])
 
 
-def _memory(pid: int) -> tuple[float, float]:
-    """Return the proportional and the resident memory of a process (MiB)."""
+class _Memory(NamedTuple):
+    """Resident memory of a process (MiB): its share of anonymous pages, its pages of files, and all pages."""
+
+    own: float
+    files: float
+    resident: float
+
+
+def _memory(pid: int) -> _Memory:
     lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:]
-    sizes = {name: int(value.split()[0]) for name, _, value in (line.partition(":") for line in lines)}
-    return sizes["Pss"] / _MIB, sizes["Rss"] / _MIB
+    sizes = {name: int(value.split()[0]) / _MIB for name, _, value in (line.partition(":") for line in lines)}
+    return _Memory(sizes["Pss_Anon"], sizes["Rss"] - sizes["Anonymous"], sizes["Rss"])
