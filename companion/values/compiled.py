@@ -78,11 +78,26 @@ def kernel(result: Any, *arguments: Any) -> Callable[[_F], _F]:
                 found = compile_(stored=True)
             except Exception:
                 found = compile_(stored=False)
-        if not found.stats.cache_hits:
+        if found.stats.cache_hits:
+            _free_intermediate_code(found)
+        else:
             _report(found.stats.cache_path)
         return cast(_F, found)
 
     return compiled
+
+
+def _free_intermediate_code(loaded: Any) -> None:
+    """Free LLVM's intermediate code of a loaded kernel, a tenth of a companion's memory at its start.
+
+    Numba keeps it to compile it into other kernels. The kernels of a file are compiled together, and none
+    calls a kernel of another file, so a loaded one is not needed for that.
+    """
+    for result in loaded.overloads.values():
+        module = getattr(result.library, "_shared_module", None)
+        if module is not None:
+            module.close()
+            result.library._shared_module = None
 
 
 _receivers: list[Callable[[str], None]] = []

@@ -113,6 +113,14 @@ def write_rows(rows: NDArray[np.intp], S_v: Array, maps: Array, normals: Array, 
 
 
 @part
+def _copy(source: Array, to: Array) -> None:
+    """Write ``source`` (3, n) to ``to``; an assignment of arrays compiles to ten times the machine code."""
+    for axis in range(3):
+        for i in range(source.shape[1]):
+            to[axis, i] = source[axis, i]
+
+
+@part
 def _inner(a: Array, b: Array) -> float:
     """Return the sum of products of ``a`` and ``b`` (3, n)."""
     total = 0.0
@@ -226,7 +234,7 @@ def active_set(
             for k in range(count):
                 r[k] = _inner(normal_of[k], image)
             _solve(gram, count, r, L)
-            z[:] = image
+            _copy(image, z)
             for k in range(count):
                 for axis in range(3):
                     for i in range(n):
@@ -252,7 +260,8 @@ def active_set(
                 if count == room:
                     return -1
                 active[count], multipliers[count], missing[count] = worst, multiplier, -short
-                normal_of[count], images[count] = normal, image
+                _copy(normal, normal_of[count])
+                _copy(image, images[count])
                 count += 1
                 for k in range(count):
                     gram[k, count - 1] = gram[count - 1, k] = _inner(normal_of[k], image)
@@ -260,10 +269,13 @@ def active_set(
             count -= 1
             for k in range(dropped, count):
                 active[k], multipliers[k], missing[k] = active[k + 1], multipliers[k + 1], missing[k + 1]
-                normal_of[k], images[k] = normal_of[k + 1], images[k + 1]
-                gram[k, : count + 1] = gram[k + 1, : count + 1]
+                _copy(normal_of[k + 1], normal_of[k])
+                _copy(images[k + 1], images[k])
+                for i in range(count + 1):
+                    gram[k, i] = gram[k + 1, i]
             for k in range(dropped, count):
-                gram[:count, k] = gram[:count, k + 1]
+                for i in range(count):
+                    gram[i, k] = gram[i, k + 1]
 
 
 @kernel(
