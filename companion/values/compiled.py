@@ -119,7 +119,7 @@ def _report(stored_in: str | None) -> None:
     )
     while _receivers:
         _receivers.pop()(
-            f"compiling the planner: a quarter of a minute, on a small computer a minute or more; {where}"
+            f"compiling the planner: 40 s on a PC, longer on a small computer; {where}"
         )
 
 
