@@ -182,7 +182,7 @@ def packed(
 
 def _packed(epoch: int, dt: int, numbers: Sequence[int], origin: int) -> bytes:
     """Encode a plan; ``numbers`` are position, velocity and accelerations (6 + 3 N,) in wire units."""
-    knots, _ = divmod(len(numbers) - 6, 3)
+    knots = (len(numbers) - 6) // 3
     if knots > KNOTS:
         raise PlanWireError(f"{knots} knots are more than {KNOTS}")
     _check_step(dt)
