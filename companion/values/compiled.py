@@ -118,9 +118,7 @@ def _report(stored_in: str | None) -> None:
         else "later starts load the result"
     )
     while _receivers:
-        _receivers.pop()(
-            f"compiling the planner: 40 s on a PC, longer on a small computer; {where}"
-        )
+        _receivers.pop()(f"compiling the planner: 40 s on a PC, longer on a small computer; {where}")
 
 
 def part(function: _F) -> _F:
