@@ -31,6 +31,7 @@ def main() -> int:
             with_uv(uv)
         else:
             with_pip(new_enough_python())
+        compile_planner()
     except SetupError as error:
         sys.stderr.write(f"outrider: {error}\n")
         return 1
@@ -92,6 +93,13 @@ def make_environment(python: str, folder: str) -> "list[str]":
         f"this Python has neither ensurepip nor pip, so {os.path.basename(folder)} cannot be made; "
         "on Debian and Ubuntu: sudo apt install python3-venv"
     )
+
+
+def compile_planner() -> None:
+    """Compile the planner's kernels now, once: the first start would otherwise wait for it."""
+    say("compiling the planner, about a minute the first time")
+    if subprocess.call([PYTHON, "-c", "import companion.node"], stdin=subprocess.DEVNULL, cwd=ROOT) != 0:
+        raise SetupError("the planner cannot be imported, see above")
 
 
 def find_pip(python: str, target: str) -> "list[str]":

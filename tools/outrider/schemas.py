@@ -56,4 +56,6 @@ def write(folder: Path) -> list[Path]:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+        sys.exit("usage: python -m outrider.schemas FOLDER")
     write(Path(sys.argv[1]))
