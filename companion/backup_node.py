@@ -45,12 +45,12 @@ from mavlink_bridge.messages import (
     Tunnel,
 )
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import WirePlan
 from mavlink_bridge.wire.plan import unpack as unpack_plan
-from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
-from mavlink_bridge.wire.roster import unpack as unpack_roster
 from mavlink_bridge.wire.signing import Signing
 
 BACKUP: Final[int] = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER
@@ -171,7 +171,7 @@ class BackupNode:
     def _store_plan(self, now: int, message: Tunnel) -> None:
         """Store a plan of the companion; discard all plans on a farewell, after which the companion lands."""
         try:
-            if message.payload_type == ROSTER and unpack_roster(message.payload).farewell:
+            if message.payload_type == AGREEMENTS and unpack_statement(message.payload).farewell:
                 self._forget()
             if message.payload_type != PLAN:
                 return

@@ -111,6 +111,7 @@ class HealthChecks:
             self._round_trips.unanswered(now),
             float(np.linalg.norm(avoidance.tracking.error)) if pilot.streaming else 0.0,
             world.neighbours.nearest(now, view.own),
+            avoidance.refused(now),
         )
 
     def _report_limits(self) -> None:

@@ -138,13 +138,15 @@ class FleetFrame:
         return float(latitude), float(longitude), float(altitude)
 
     @cached_property
-    def fingerprint(self) -> int:
-        """8-bit checksum of the origin; it detects plans made in another frame, except for one in 256.
-
-        The origin is rounded to the steps of the wire: degE7 and mm.
-        """
+    def checksum(self) -> int:
+        """32-bit checksum of the origin, rounded to the steps of the wire: degE7 and mm."""
         origin = round(self.latitude * 1e7), round(self.longitude * 1e7), round(self.altitude * 1e3)
-        return crc32(b"".join(part.to_bytes(8, "little", signed=True) for part in origin)) & 0xFF
+        return crc32(b"".join(part.to_bytes(8, "little", signed=True) for part in origin))
+
+    @property
+    def fingerprint(self) -> int:
+        """Lowest 8 bits of ``checksum``, for which a plan message has room; one frame in 256 has the same."""
+        return self.checksum & 0xFF
 
     def local(self, latitude: float, longitude: float, altitude: float) -> LocalFrame:
         """Return the local NED frame of a vehicle whose GPS_GLOBAL_ORIGIN is the given point."""

@@ -52,6 +52,15 @@ class CertifiedConfig(Settings):
     repeat_us: int = Field(
         50_000, gt=0, le=2_000_000, multiple_of=4, description="µs between two transmissions of a plan"
     )
+    patience_us: int = Field(
+        100_000,
+        ge=0,
+        le=2_000_000,
+        description="µs of an epoch for which a plan waits for agreements on the newest plans",
+    )
+    gone_us: int = Field(
+        1_000_000, gt=0, le=60_000_000, description="µs of silence after which no plan waits for a vehicle"
+    )
     tube: Positive = Field(
         0.25, description="m, largest tracking error for which plans keep their separation"
     )

@@ -18,6 +18,7 @@ from companion.flight.guard import Holding
 from companion.flight.vehicle import Vehicle
 from companion.telemetry.status_text import Severity
 from companion.values.phase import Phase
+from companion.values.refused_senders import RefusedSenders
 from companion.world import View
 
 
@@ -47,7 +48,8 @@ class HealthInputs(NamedTuple):
     origin has moved, the last time shifting the vehicle by ``displaced`` m; ``clock_lost``: µs that the
     autopilot's clock has lost in total; ``unanswered``: the autopilot's messages are late, and it does not
     answer whether its clock is the reason; ``error``: distance (m) of the vehicle from its set-points;
-    ``nearest``: system id and distance (m) of the nearest neighbour.
+    ``nearest``: system id and distance (m) of the nearest neighbour; ``refused``: senders whose plans are
+    refused.
     """
 
     now: int
@@ -65,6 +67,7 @@ class HealthInputs(NamedTuple):
     unanswered: bool = False
     error: float = 0.0
     nearest: tuple[int, float] | None = None
+    refused: RefusedSenders = RefusedSenders()
 
 
 class Change(NamedTuple):
@@ -133,6 +136,7 @@ class HealthMonitor:
             self._slow_clock(s),
             self._late_messages(s),
             self._origin(s),
+            *self._refused(s),
             *self._others(s),
         ]
         return [concern for concern in found if concern is not None]
@@ -208,6 +212,17 @@ class HealthMonitor:
         if near is None or s.nearest is None or s.phase in _ON_THE_GROUND or s.nearest[1] >= near:
             return None
         return Concern(f"near {s.nearest[0]}", f"Neighbour {s.nearest[0]} is near: slower")
+
+    def _refused(self, s: HealthInputs) -> list[Concern]:
+        doubled = [
+            Concern(f"doubled {system}", f"Two vehicles have id {system}: no new plans")
+            for system in s.refused.doubled
+        ]
+        foreign = [
+            Concern(f"foreign {system}", f"Plans of {system} are in another frame")
+            for system in s.refused.foreign
+        ]
+        return doubled + foreign
 
     def _fence(self, s: HealthInputs) -> Concern | None:
         guard, own = self._config.guard, s.view.own

@@ -12,6 +12,7 @@ from companion.flight.guard import Holding
 from companion.flight.lowering import Lowered
 from companion.flight.tracking import Tracking
 from companion.values.horizon import Array, Horizon, Motion
+from companion.values.refused_senders import RefusedSenders
 from companion.world import View
 from mavlink_bridge.messages import Message
 
@@ -92,6 +93,10 @@ class Avoidance(Protocol):
     @property
     def log(self) -> PlanLog:
         """Log of the field's plans since the last ``shed``."""
+        ...
+
+    def refused(self, now: int) -> RefusedSenders:
+        """Return the senders whose plans are refused at ``now`` (µs)."""
         ...
 
     def shed(self) -> None:

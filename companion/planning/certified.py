@@ -15,6 +15,7 @@ from companion.flight.tracking import Tracking
 from companion.planning.avoidance import AvoidanceInputs, Tally
 from companion.planning.plan_times import PlanTimes
 from companion.values.horizon import Array, Horizon, Motion
+from companion.values.refused_senders import RefusedSenders
 from companion.world import View, World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
@@ -60,6 +61,10 @@ class CertifiedAvoidance:
         failures = commitment.held[HoldReason.UNSOLVED]
         counts = self._plans, 0, failures, self.held, commitment.anchored_anew
         return Tally(*counts, times.plan_ns[:], times.plan_at[:])
+
+    def refused(self, now: int) -> RefusedSenders:
+        """Return the senders whose committed plans are refused at ``now`` (µs)."""
+        return self._flight.agreements.refused_senders(now)
 
     def shed(self) -> None:
         """Do nothing: the log is empty."""
@@ -109,7 +114,7 @@ class CertifiedAvoidance:
         return now < self.next_due and self._flight.idle(now)
 
     def receive(self, now: int, link: str, message: Message) -> bool:
-        """Receive TUNNEL (plans, rosters) and TIMESYNC of the swarm link; return False for other messages."""
+        """Receive TUNNEL (plans, agreements) and TIMESYNC of the swarm link; return False for others."""
         if link != "swarm" or not isinstance(message, Tunnel | Timesync):
             return False
         self._flight.receive(now, message)
@@ -130,7 +135,7 @@ class CertifiedAvoidance:
         if aim is None:
             flight.commitment.carry_on(HoldReason.MISSING)
         elif flight.lost:
-            flight.commitment.anchor(now, situation.measured)
+            flight.anchor(now, situation.measured)
         else:
             self._plans += flight.plan(now, aim, self._world, situation.view)
         self._times.add(now, started)

@@ -20,6 +20,7 @@ from companion.planning.avoidance import AvoidanceInputs, Tally
 from companion.planning.plan_times import PlanTimes
 from companion.values.horizon import Array, Horizon, Motion, roll_out
 from companion.values.phase import Phase
+from companion.values.refused_senders import RefusedSenders
 from companion.values.vectors import clipped
 from companion.world import View, World
 from mavlink_bridge.messages import Message
@@ -71,6 +72,10 @@ class FieldAvoidance:
         guard, times = self.guard, self._times
         counts = self._plans, self._relaxed, guard.failures, guard.held, guard.anchored_anew
         return Tally(*counts, times.plan_ns[:], times.plan_at[:])
+
+    def refused(self, now: int) -> RefusedSenders:
+        """Return nothing: the field uses no committed plans."""
+        return RefusedSenders()
 
     def shed(self) -> None:
         """Empty the log."""

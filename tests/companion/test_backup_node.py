@@ -24,11 +24,11 @@ from mavlink_bridge.messages import (
     Tunnel,
 )
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import Entry, Statement
+from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
-from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
-from mavlink_bridge.wire.roster import Roster
-from mavlink_bridge.wire.roster import pack as pack_roster
 from mavlink_bridge.wire.signing import Signing
 
 SYSTEM = 11
@@ -213,10 +213,26 @@ def test_after_a_farewell_it_is_silent() -> None:
     """The companion lands: no set-point may come in between."""
     bench = Bench()
     bench.run(1.0)
-    farewell = Tunnel(COMPANION, 0, 0, ROSTER, pack_roster(Roster(BEGIN, frozenset(), True)))
-    bench.node.step(bench.now, [bench.tell("swarm", farewell)])
+    bench.node.step(bench.now, [bench.tell("swarm", stated(farewell=True))])
     bench.speaks = False
     assert bench.run(3.0) == []
+
+
+def stated(source: Source = COMPANION, *, farewell: bool = False) -> Tunnel:
+    """A statement of the companion's agreements."""
+    said = Statement(FLEET.checksum, BEGIN, BEGIN, (Entry(12, ((BEGIN, BEGIN),), (BEGIN, BEGIN)),), farewell)
+    return Tunnel(source, 0, 0, AGREEMENTS, pack_statement(said))
+
+
+def test_statements_without_a_farewell_and_those_of_others_change_nothing() -> None:
+    bench = Bench()
+    bench.run(1.0)
+    others = stated(Source(12, COMPONENT), farewell=True)
+    garbage = stated()._replace(payload=b"\x01\x01")
+    for message in (stated(), others, garbage):
+        bench.node.step(bench.now, [bench.tell("swarm", message)])
+    bench.speaks = False
+    assert bench.run(3.0)
 
 
 def test_another_companions_plan_is_not_flown() -> None:

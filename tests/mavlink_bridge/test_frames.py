@@ -149,13 +149,19 @@ def test_the_turn_between_meridians_has_the_right_sense() -> None:
 
 
 @given(frames)
-def test_fingerprint_is_a_byte_of_the_origin_on_the_wire(frame: FleetFrame) -> None:
-    assert 0 <= frame.fingerprint <= 255
+def test_checksum_is_that_of_the_origin_on_the_wire_and_the_fingerprint_a_byte_of_it(
+    frame: FleetFrame,
+) -> None:
+    assert 0 <= frame.checksum < 2**32
+    assert frame.fingerprint == frame.checksum % 256
     degrees = (round(angle * 1e7) / 1e7 for angle in (frame.latitude, frame.longitude))
     same = FleetFrame(*degrees, round(frame.altitude * 1e3) / 1e3)
-    assert same.fingerprint == frame.fingerprint
+    assert same.checksum == frame.checksum
 
 
-def test_fingerprints_of_neighbouring_origins_differ_mostly() -> None:
-    prints = [FleetFrame(47.0 + step * 1e-7, 8.0, 400.0).fingerprint for step in range(64)]
-    assert len(set(prints)) > 50
+def test_checksums_of_neighbouring_origins_differ_and_fingerprints_mostly() -> None:
+    """Along a line of 4 m that goes north, and up by as many mm."""
+    moved = [FleetFrame(47.0 + step * 1e-7, 8.0, 400.0) for step in range(400)]
+    moved += [FleetFrame(47.0, 8.0, 400.0 + 1e-3 * step) for step in range(1, 400)]
+    assert len({frame.checksum for frame in moved}) == len(moved)
+    assert len({frame.fingerprint for frame in moved[:64]}) > 50

@@ -35,6 +35,9 @@ from mavlink_bridge.messages import (
     Timesync,
     Tunnel,
 )
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import Entry, Statement
+from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
 from outrider.resources import config_root
@@ -69,6 +72,13 @@ def scan(boot: int) -> m.ObstacleDistance:
     return m.ObstacleDistance(AUTOPILOT, boot, 0, distances, math.radians(5.0), 0.2, 20.0, 0.0, 12)
 
 
+def agreements(checksum: int, epoch: int = NOW) -> Tunnel:
+    """A neighbour's statement of its agreements, with an entry of each form."""
+    now, before = (epoch, epoch), (epoch - 200_000, epoch)
+    entries = Entry(11, (now,), now), Entry(13, (before,), now), Entry(14, departed=True)
+    return Tunnel(NEIGHBOUR, 0, 0, AGREEMENTS, pack_statement(Statement(checksum, epoch, epoch, entries)))
+
+
 def absurd_plan(random: Random, fingerprint: int, epoch: int) -> Tunnel:
     """A plan that fits the wire and no vehicle: numbers at the ends of their ranges, steps of any length, or
     some of its bytes lost or changed."""
@@ -93,7 +103,7 @@ def absurd_plan(random: Random, fingerprint: int, epoch: int) -> Tunnel:
     return Tunnel(NEIGHBOUR, 0, 0, PAYLOAD_TYPE, data[:128])
 
 
-def messages(fingerprint: int = 0, now: int = NOW) -> tuple[Known, ...]:
+def messages(checksum: int = 0, now: int = NOW) -> tuple[Known, ...]:
     """Of every row of the table at least one, with values as in a flight at ``now`` (µs)."""
     place = LATITUDE, LONGITUDE, ALTITUDE + 5.0
     boot = now - NOW
@@ -165,7 +175,8 @@ def messages(fingerprint: int = 0, now: int = NOW) -> tuple[Known, ...]:
         Known(
             "swarm", m.AdsbVehicle(Source(11, 156), 0x4B1234, *place, True, 1.0, 60.0, 0.0, "HB", 1, 10**6)
         ),
-        Known("swarm", plan(fingerprint, now)),
+        Known("swarm", plan(checksum & 0xFF, now)),
+        Known("swarm", agreements(checksum, now)),
         *(Known("autopilot", message) for message in services()),
     )
     missing = {row.message for row in BY_ID.values()} - {type(known.message) for known in found}

@@ -48,7 +48,7 @@ def in_flight(seed: int) -> Bench:
 
 def datagram(random: Random, links: tuple[str, ...], now: int) -> Datagram:
     """A frame or some, absurd or damaged or both, by one of ``links``: as a rule where it belongs."""
-    known = [one for one in messages(FLEET.fingerprint, now) if one.link in links]
+    known = [one for one in messages(FLEET.checksum, now) if one.link in links]
     if "swarm" in links:
         known += [Known("swarm", absurd_plan(random, FLEET.fingerprint, now)) for _ in range(4)]
     one = random.choice(known)

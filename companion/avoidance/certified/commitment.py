@@ -1,9 +1,9 @@
 """Committed plan of one vehicle from epoch to epoch: when to hold, when to replan, which plan to announce.
 
 In the epoch that begins at t_e every vehicle flies its plan of t_e and makes its plan of t_{e+1}: by solving,
-as soon as it holds the plans of t_e of its whole coordination set; or, when the epoch is nearly over, by
-carrying its own plan on. In both cases it announces the plan of t_{e+1}, and repeats it until the next one.
-Delivery of messages is never needed for safety, only for progress.
+on its own side of all agreed planes; or, without an agreement with a member, by carrying its own plan on. In
+both cases it announces the plan of t_{e+1}, and repeats it until the next one. Delivery of messages is never
+needed for safety, only for progress.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from mavlink_bridge.wire.plan import WirePlan, quantise
 class HoldReason(Enum):
     """Reason for carrying a plan on instead of making a new one."""
 
-    MISSING = "an input is missing: a member's plan or roster, the own position, or the destination"
+    MISSING = "an input is missing: an agreement with a member, the own position, or the destination"
     CLOCK = "the clock of a member, or the own clock, is wrong"
     UNSOLVED = "no plan that keeps all planes was found"
 
@@ -72,12 +72,13 @@ class Commitment:
         """Return the beginning (µs) of the epoch that holds ``now`` (µs)."""
         return now - now % self._config.epoch_us
 
-    def begin(self, now: int, position: Array) -> None:
-        """Hold ``position`` (3,), m; the plan to announce is that of the first epoch not announced yet."""
+    def begin(self, now: int, position: Array) -> int:
+        """Hold ``position`` (3,), m; return the epoch (µs) of the plan to announce, the first unannounced."""
         epoch, steps = self.epoch(now), self._program.n
         self.current = resting(epoch, self._config.dt_us, steps, position, self._origin)
         free = max(epoch, self.announced_until) + self._config.epoch_us
         self.following = self.current._replace(epoch=free)
+        return free
 
     def turn(self, now: int) -> bool:
         """Advance to the epoch that holds ``now`` (µs); return whether its following plan is to be made."""
@@ -138,8 +139,8 @@ class Commitment:
         self.carry_on(HoldReason.UNSOLVED)
         return False
 
-    def anchor(self, now: int, measured: Motion) -> None:
-        """Plan the next epoch anew from the ``measured`` motion, to rest.
+    def anchor(self, now: int, measured: Motion) -> int:
+        """Plan the next epoch anew from the ``measured`` motion, to rest; return its beginning (µs).
 
         This is for a vehicle far from its plan, after a jump of its position or a push. The transition from
         the old plan to this one is not certified.
@@ -159,6 +160,7 @@ class Commitment:
         slowing[-1] = 0.0
         self.following = committed(start, slowing)
         self.anchored_anew += 1
+        return begins
 
     def horizon(self) -> Horizon | None:
         """Return the flown horizon: this epoch's plan, followed by the next one's once that is made."""

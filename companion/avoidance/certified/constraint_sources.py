@@ -1,4 +1,4 @@
-"""Constraint sources of a certified plan: plans of peers, fixed obstacles and non-cooperative vehicles.
+"""Constraint sources of a certified plan: agreements with peers, fixed obstacles, non-cooperative vehicles.
 
 All are given on the plan's own knots.
 """
@@ -9,10 +9,10 @@ from math import hypot
 
 import numpy as np
 
+from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.committed import horizon_of
 from companion.avoidance.certified.margins import beside, between, fastest, margin
 from companion.avoidance.certified.noncooperative import NonCooperative
-from companion.avoidance.certified.peer_plans import PeerPlans
 from companion.avoidance.certified.separating_planes import Others
 from companion.config import CompanionConfig
 from companion.config.obstacles import Post
@@ -41,43 +41,46 @@ class ConstraintSources:
         self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + self.between + _SIGHT_MARGIN_M
 
     def around(
-        self, now: int, epoch: int, own: Array, peers: PeerPlans, world: World, view: View
+        self, now: int, epoch: int, own: Array, agreements: Agreements, world: World, view: View
     ) -> tuple[Others, Array]:
         """Return the constraints of the plan that begins one epoch after ``epoch`` (µs), and the field.
 
         They are as known at ``now`` (µs). The field f (n, 3), m/s², acts in the plan's cost only.
         ``own`` (n, 3, 3), m: the committed control points from the next epoch on.
         """
-        plans = [filed.controls for filed in peers.plans(epoch).values()]
-        aside = self._beside_last_plan(now, peers, world)
+        begins = epoch + self._config.certified.epoch_us
+        agreed = agreements.agreed()
+        aside = self._beside_last_plan(now, agreements, world)
         # A vehicle that said farewell may drift while it descends. One that is further than ``between`` from
         # its last plan may be flown by another controller, at any height: it counts as non-cooperative while
         # it sends. Once it is silent it counts as landed at its last position, as it may be switched off.
         taken_over = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
-        members = peers.members.union(peers.left.keys() - taken_over)
-        begins = epoch + self._config.certified.epoch_us
+        members = agreements.members.union(agreements.left.keys() - taken_over) - agreements.away
         seen = self._noncooperative.seen(begins, members, world)
         noncooperative = [
             *self._noncooperative.balls(seen, own),
             *self._noncooperative.target(now, begins, view),
         ]
         sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
-        ends = [filed.controls[-1, 2] for filed in peers.left.values()]
+        ends = [filed.controls[-1, 2] for filed in agreements.left.values()]
         landed = [*ends, *(place for system, (_, place, _) in aside.items() if system not in taken_over)]
+        final = [last.later(begins, self._steps) for last in agreements.left.values()]
         unshared = [
+            *((plan, np.full(self._steps, self.between)) for plan in final),
             *self._fixed_constraints(own),
             *self._landed_constraints(own, landed),
             *noncooperative,
             *self._sensed_constraints(sensed),
         ]
-        count, n = len(plans), self._steps
-        controls = np.empty((count + len(unshared), n, 3, 3))
-        if plans:
-            controls[:count] = _later(np.array(plans), self._config.certified.knots)
+        count, n = len(agreed), self._steps
+        bases, controls = (np.empty((count + len(unshared), n, 3, 3)) for _ in range(2))
+        bases[:] = own
+        for index, pair in enumerate(agreed):
+            bases[index], controls[index] = pair.own.later(begins, n), pair.other.later(begins, n)
         distance = np.full((len(controls), n), self.between)
         for index, (centres, radii) in enumerate(unshared, count):
             controls[index], distance[index] = centres, radii
-        others = Others(controls, distance, np.arange(len(controls)) < count)
+        others = Others(bases, controls, distance, np.arange(len(controls)) < count)
         return others, self._noncooperative.field(seen, own, sensed)
 
     def _fixed_constraints(self, own: Array) -> list[tuple[Array, Array]]:
@@ -113,7 +116,7 @@ class ConstraintSources:
         ]
 
     def _beside_last_plan(
-        self, now: int, peers: PeerPlans, world: World
+        self, now: int, agreements: Agreements, world: World
     ) -> dict[int, tuple[float, Array, bool]]:
         """Return the vehicles that said farewell and have since reported a position beside their last plan.
 
@@ -121,7 +124,7 @@ class ConstraintSources:
         whether messages still arrive. Differences up to ``margins.beside`` are tolerated.
         """
         found: dict[int, tuple[float, Array, bool]] = {}
-        left = peers.left
+        left = agreements.left
         if not left:
             return found
         for system, time, position, _ in world.neighbours.last_received():
@@ -144,12 +147,3 @@ class ConstraintSources:
             centres[..., :2] = place[:2]
             found.append((centres, np.full(self._steps, self.between)))
         return found
-
-
-def _later(controls: Array, knots: int) -> Array:
-    """Return control points (M, n, 3, 3) ``knots`` later; after the end they rest."""
-    result = np.empty_like(controls)
-    left = max(controls.shape[1] - knots, 0)
-    result[:, :left] = controls[:, knots:]
-    result[:, left:] = controls[:, -1:, 2:]
-    return result

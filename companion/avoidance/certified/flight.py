@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.commitment import Commitment, HoldReason
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
-from companion.avoidance.certified.peer_plans import PeerPlans
 from companion.avoidance.certified.qp import Objective, SeparationQp
+from companion.avoidance.certified.separating_planes import keeps
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
@@ -17,17 +18,17 @@ from companion.world import View, World
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
-from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack
-from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
-from mavlink_bridge.wire.roster import Roster
-from mavlink_bridge.wire.roster import pack as pack_roster
-from mavlink_bridge.wire.roster import unpack as unpack_roster
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import Statement, in_messages
+from mavlink_bridge.wire.agreements import pack as pack_statement
+from mavlink_bridge.wire.agreements import unpack as unpack_statement
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack
 
 _TURNING_SENSES = {"left": -1.0}
 
 
 class CertifiedFlight:
-    """Certified mode of one vehicle: its committed plan, the peers' plans and the constraint sources."""
+    """Certified mode of one vehicle: its committed plan, the agreements and the constraint sources."""
 
     def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
         certified, steps = config.certified, config.horizon.steps + 1
@@ -41,17 +42,17 @@ class CertifiedFlight:
         self.commitment = Commitment(
             certified, program, self._deadlock_turn, fleet.fingerprint, planar=config.planar
         )
-        self.peers = PeerPlans(
+        self._sources = ConstraintSources(config, steps)
+        distance, planar = np.full((1, steps + 1), self._sources.between), config.planar
+        self.agreements = Agreements(
             own.system,
-            frozenset(certified.fleet),
+            certified,
             steps,
-            certified.dt_us,
-            certified.epoch_us,
-            fleet.fingerprint,
+            fleet.checksum,
+            lambda newest, one, other: keeps(newest, one, other, distance, upright=planar),
         )
         self.clocks = ClockWatch(own, certified.clock_us)
         self._replies: list[Timesync] = []
-        self._sources = ConstraintSources(config, steps)
         seconds = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
         self._before_end: Array = seconds - seconds[-1]
         self._steps = steps
@@ -59,25 +60,29 @@ class CertifiedFlight:
         """Distance (m) of the vehicle from its plan: ``deviation`` now, ``largest_deviation`` at most."""
         self.left_tube = 0
         """Number of times that the vehicle left the tube."""
-        self._outside = self._in_control = self._announced = False
+        self._outside = self._in_control = self._announced = self._received = self._participated = False
+        self._turn = 0
         self._polled_at: int | None = None
         self._next_announcement = 0
         self.lookahead_s = float(seconds[-1]) + 1e-6 * certified.epoch_us
         """Time (s) from now to the end of the plan that is made next, at most."""
 
     def receive(self, now: int, message: Tunnel | Timesync) -> None:
-        """Receive a TUNNEL or TIMESYNC of the swarm link; count rosters that cannot be decoded as refused."""
+        """Receive a TUNNEL or TIMESYNC of the swarm link; a statement that cannot be decoded is refused."""
         system = message.source.system
         if isinstance(message, Timesync):
             self._replies += self.clocks.receive(now, message)
             return
         if message.payload_type == PAYLOAD_TYPE:
-            self.peers.receive_plan(now, system, message.payload)
-        elif message.payload_type == ROSTER:
+            self.agreements.receive_plan(now, system, message.payload)
+        elif message.payload_type == AGREEMENTS:
             try:
-                self.peers.receive_roster(now, system, unpack_roster(message.payload))
+                self.agreements.receive_statement(now, system, unpack_statement(message.payload))
             except PlanWireError:
-                self.peers.refused += 1
+                self.agreements.refused += 1
+        else:
+            return
+        self._received = True
 
     def stand(self, now: int, position: Array) -> None:
         """While not in control, continue the committed plan, or hold ``position`` (3,), m.
@@ -95,25 +100,45 @@ class CertifiedFlight:
             if inside or commitment.announced_until >= commitment.epoch(now):
                 commitment.turn(now)
                 return
-        commitment.begin(now, position)
+        self.agreements.begin(commitment.begin(now, position))
         commitment.anchored_anew += self._announced
         self._in_control = self._announced = False
 
     def due(self, now: int) -> bool:
         """Begin the next epoch if it is time; return True if ``plan`` is to be called for it now.
 
-        That is when no member's clock is wrong and ``peers.missing`` is empty. Otherwise the result is False,
-        and at the last call (``Commitment.last_call``) the committed plan is continued for an epoch.
+        That is when no member's clock is wrong and there is an agreement with each member. If an agreement on
+        the newest plans is about to be made, the plan waits for it until ``patience_us`` of the epoch are
+        over. Without an agreement with a member, the committed plan is continued for an epoch at the last
+        call (``Commitment.last_call``).
         """
         self._polled_at, self._in_control = now, True
-        if not self.commitment.turn(now):
+        turned = self.commitment.turn(now)
+        self._agree(now)
+        if not turned:
             return False
-        wrong = not self.clocks.wrong.isdisjoint(self.peers.members)
-        if not wrong and not self.peers.missing(self.commitment.epoch(now)):
-            return True
-        if self.commitment.last_call(now):
-            self.commitment.carry_on(HoldReason.CLOCK if wrong else HoldReason.MISSING)
-        return False
+        wrong = not self.clocks.wrong.isdisjoint(self.agreements.members)
+        if wrong or self.agreements.missing():
+            if self.commitment.last_call(now):
+                self.commitment.carry_on(HoldReason.CLOCK if wrong else HoldReason.MISSING)
+            return False
+        epoch = self.commitment.epoch(now)
+        waits = now < epoch + self._config.certified.patience_us and not self.commitment.last_call(now)
+        return not (waits and self.agreements.outdated(now, epoch))
+
+    def _agree(self, now: int) -> None:
+        """Take and propose agreements if a message was received or a plan was made."""
+        announced = self.commitment.announced()
+        if announced is None:
+            return
+        new = self.agreements.made(announced)
+        if new or self._received:
+            self._received = False
+            self.agreements.update(now)
+
+    def anchor(self, now: int, measured: Motion) -> None:
+        """Plan anew from the ``measured`` motion; all agreements are void (``Commitment.anchor``)."""
+        self.agreements.begin(self.commitment.anchor(now, measured))
 
     def watch(self, now: int, measured: Motion) -> None:
         """Record how far the vehicle is from its plan.
@@ -143,7 +168,8 @@ class CertifiedFlight:
         commitment = self.commitment
         start = commitment.start()
         own = commitment.own()
-        others, field = self._sources.around(now, commitment.epoch(now), own, self.peers, world, view)
+        epoch = commitment.epoch(now)
+        others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
         goal = self._deadlock_turn.turned(start.position_m, aim.destination)
         places = goal + self._before_end[:, None] * aim.velocity
         objective = Objective(places, np.broadcast_to(aim.velocity, places.shape), field)
@@ -153,7 +179,7 @@ class CertifiedFlight:
         """Return whether there is nothing to make or to announce until something else is due."""
         following = self.commitment.following
         waiting = following is not None and now < following.epoch and now < self._next_announcement
-        return waiting and not self._replies
+        return waiting and not self._replies and not self._received and not self.agreements.changed
 
     def horizon(self) -> Horizon | None:
         """Return the horizon that is flown; None without a plan."""
@@ -162,10 +188,11 @@ class CertifiedFlight:
     def messages(self, now: int, *, farewell: bool = False) -> list[Message]:
         """Return the messages for the swarm link now.
 
-        They are TIMESYNC messages, and the newest plan with its roster (the present coordination set), at
-        once and then every ``repeat_us``. ``farewell``: the vehicle makes no further plan; the roster says so
-        once the vehicle flies the last one. Without ``farewell``, call ``due`` or ``stand`` at ``now`` first:
-        otherwise the vehicle counts as not in control, and no plan is announced.
+        They are TIMESYNC messages; the newest plan with a statement of all agreements, at once and then every
+        ``repeat_us``; and a statement of the agreements that changed. ``farewell``: the vehicle makes no
+        further plan; the statement says so once the vehicle flies the last one. Without ``farewell``, call
+        ``due`` or ``stand`` at ``now`` first: otherwise the vehicle counts as not in control, and no plan is
+        announced.
         """
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()
@@ -176,17 +203,40 @@ class CertifiedFlight:
             self._in_control = False
         announced = self.commitment.announced()
         if announced is None or not (self._in_control or farewell):
-            return sync
+            return [*sync, *self._away(now)]
+        self._agree(now)
         if announced.epoch == self.commitment.announced_until and now < self._next_announcement:
-            return sync
+            return [*sync, *self._statements(announced.epoch, every=False)] if not farewell else sync
         self.commitment.announced_until = announced.epoch
         self._next_announcement = now + self._config.certified.repeat_us
         self._announced = True
+        self._participated = not farewell
         if farewell:
-            self.peers.leave(announced.epoch)
-        roster = Roster(announced.epoch, self.peers.members, farewell)
-        return [
-            *sync,
-            Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(announced)),
-            Tunnel(self._own, 0, 0, ROSTER, pack_roster(roster)),
-        ]
+            self.agreements.leave(announced.epoch)
+        statements = self._statements(announced.epoch, every=True, farewell=farewell)
+        plans = [announced, *self._repeated()]
+        return [*sync, *(Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan)) for plan in plans), *statements]
+
+    def _away(self, now: int) -> list[Message]:
+        """Return the statement that another controller flies the vehicle, if plans were announced before."""
+        if not self._participated or now < self._next_announcement:
+            return []
+        self._next_announcement = now + self._config.certified.repeat_us
+        epoch, since = self.commitment.epoch(now), self.agreements.since
+        statement = Statement(self.agreements.frame, epoch, since, away=True)
+        return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(statement))]
+
+    def _repeated(self) -> list[WirePlan]:
+        """Return one of the plans that a peer needs for a proposal, each in turn."""
+        plans = self.agreements.unanswered()
+        self._turn += 1
+        return [plans[self._turn % len(plans)]] if plans else []
+
+    def _statements(self, epoch: int, *, every: bool, farewell: bool = False) -> list[Message]:
+        """Return the statement of ``every`` agreement, or of those that changed; ``epoch`` (µs): own plan."""
+        agreements = self.agreements
+        if not every and not agreements.changed:
+            return []
+        entries = agreements.entries(every=every)
+        statement = Statement(agreements.frame, epoch, agreements.since, entries, farewell)
+        return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(part)) for part in in_messages(statement)]

@@ -29,18 +29,17 @@ def margin(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) ->
 def between(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
     """Return the least distance (m) between two plans: d_min and the deviations of both.
 
-    The errors of two estimates are independent, so they add as squares.
+    Each estimate may be off by k·σ, in opposite directions.
     """
-    strays = 2.0 * _strays(config, limits)
-    return field.d_min + strays + sqrt(2.0) * config.sigmas * field.position_sigma
+    return field.d_min + 2.0 * margin(config, field, limits)
 
 
 def beside(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
     """Return how far (m) from the end of its plan a vehicle at rest there may report its position.
 
-    The position estimate at the time of the plan and the reported estimate both have errors.
+    The position estimate at the time of the plan and the reported estimate may both be off by k·σ.
     """
-    return _strays(config, limits) + sqrt(2.0) * config.sigmas * field.position_sigma
+    return _strays(config, limits) + 2.0 * config.sigmas * field.position_sigma
 
 
 def _strays(config: CertifiedConfig, limits: LimitsConfig) -> float:

@@ -1,18 +1,18 @@
 """Moving planes between a vehicle and everything else.
 
-They keep two new plans apart although each side knows only the other's old plan. For a neighbour and a
-segment, r_i are the control points of the own committed plan minus the neighbour's (the same knots, so the
-same index), x the point of their triangle nearest to the origin, c = x/‖x‖. Both sides compute the same plane
-with opposite normals, because floating point is symmetric under a change of sign. The new plan's control
-point i must satisfy
+They keep two new plans apart although each side knows only an older plan of the other. Both sides compute
+them from one pair of plans, one of each. For a neighbour and a segment, r_i are the control points of the own
+plan of the pair minus those of the neighbour's (the same knots, so the same index), x the point of their
+triangle nearest to the origin, c = x/‖x‖. Both sides compute the same plane with opposite normals, because
+floating point is symmetric under a change of sign. A new plan's control point i must satisfy
 
     c·q_i ≥ c·(own_i + other_i)/2 + min(d, c·r_i)/2,
 
-where own_i and other_i are the control points of the two committed plans, and d is the least distance. The
+where own_i and other_i are the control points of the two plans of the pair, and d is the least distance. The
 neighbour's new plan must satisfy the same from the other side. So any two new plans are min(d, c·r_i) apart
 along c at every control point, hence everywhere on the segment (a Bézier curve lies in the hull of its
-control points). The committed plan itself satisfies it, with room max(c·r_i − d, 0)/2. For an obstacle that
-shares no plan the own side keeps the whole distance.
+control points). The own plan of the pair itself satisfies it, with room max(c·r_i − d, 0)/2. For an obstacle
+that shares no plan the own side keeps the whole distance, and the own plan of the pair is the committed one.
 """
 
 from __future__ import annotations
@@ -30,12 +30,14 @@ _TINY = 1e-12
 
 
 class Others(NamedTuple):
-    """M plans to keep away from.
+    """M pairs of plans whose planes a plan keeps to.
 
-    ``controls`` (M, n, 3, 3), m: control points on the own plan's knots. ``distance`` (M, n), m: least
-    distance on each segment. ``shares`` (M,): whether the other side keeps half of it itself.
+    ``own`` and ``controls`` (M, n, 3, 3), m: control points of the own plan and of the other plan of each
+    pair, on the committed plan's knots. ``distance`` (M, n), m: least distance on each segment. ``shares``
+    (M,): whether the other side keeps half of it itself.
     """
 
+    own: Array
     controls: Array
     distance: Array
     shares: NDArray[np.bool_]
@@ -45,26 +47,36 @@ class Planes(NamedTuple):
     """Normals c (M, n, 3), and the least c·q for each control point (M, n, 3).
 
     ``least`` is what must hold; ``wanted`` is slightly more where the committed plan allows it, so that a
-    rounded plan still keeps ``least``. ``room`` (M, n, 3), m: by how much the committed plan exceeds
-    ``least``.
+    rounded plan still keeps ``least``.
     """
 
     normals: Array
     least: Array
     wanted: Array
-    room: Array
 
 
-def planes(own: Array, others: Others, spare: float, *, upright: bool = False) -> Planes:
-    """Return the planes about the committed control points ``own`` (n, 3, 3), m.
+def planes(committed: Array, others: Others, spare: float, *, upright: bool = False) -> Planes:
+    """Return the planes for a plan that replaces the ``committed`` one (n, 3, 3), m.
 
     ``spare`` (m) is wanted beyond the least distance. ``upright``: heights do not count.
     """
     found = Planes(*(np.empty((*others.distance.shape, 3)) for _ in Planes._fields))
     # The kernel needs contiguous arrays; those of a flight are contiguous already.
-    own, controls, distance = map(np.ascontiguousarray, (own, others.controls, others.distance))
-    _planes(own, controls, distance, others.shares, spare, upright, *found)
+    committed, own, controls, distance = map(
+        np.ascontiguousarray, (committed, others.own, others.controls, others.distance)
+    )
+    _planes(committed, own, controls, distance, others.shares, spare, upright, *found)
     return found
+
+
+def keeps(newest: Array, own: Array, other: Array, distance: Array, *, upright: bool = False) -> bool:
+    """Return whether ``newest`` keeps the own side of the planes of the pair of plans ``own`` and ``other``.
+
+    All are control points (n, 3, 3), m, on the same knots; ``distance`` (1, n), m.
+    """
+    pair = Others(own[None], other[None], distance, np.ones(1, dtype=np.bool_))
+    found = planes(newest, pair, 0.0, upright=upright)
+    return bool((along(found.normals, newest) >= found.least).all())
 
 
 def along(normals: Array, points: Array) -> Array:
@@ -146,8 +158,9 @@ def _nearest_all(triangles: Array, normals: Array) -> None:
         _nearest(triangles[k], candidate, normals[k])
 
 
-@kernel(VOID, array(3), array(4), array(2), array(1, BOOL), FLOAT, BOOL, *[output(3)] * 4)
+@kernel(VOID, array(3), array(4), array(4), array(2), array(1, BOOL), FLOAT, BOOL, *[output(3)] * 3)
 def _planes(
+    committed: Array,
     own: Array,
     controls: Array,
     distance: Array,
@@ -157,26 +170,25 @@ def _planes(
     normals: Array,
     least: Array,
     wanted: Array,
-    room: Array,
 ) -> None:
-    """Write the planes of the module's docstring to the last four arrays."""
+    """Write the planes of the module's docstring to the last three arrays."""
     relative, candidate = np.empty((3, 3)), np.empty(3)
     for m in range(len(controls)):
         half = 0.5 if shares[m] else 1.0
-        for n in range(len(own)):
+        for n in range(len(committed)):
             for i in range(3):
                 for k in range(3):
-                    relative[i, k] = own[n, i, k] - controls[m, n, i, k]
+                    relative[i, k] = own[m, n, i, k] - controls[m, n, i, k]
                 if upright:
                     relative[i, 2] = 0.0
             c = normals[m, n]
             _nearest(relative, candidate, c)
             for i in range(3):
-                here = _dot(c, own[n, i])
+                here = _dot(c, own[m, n, i])
                 gap = _dot(c, relative[i]) - distance[m, n]
-                room[m, n, i] = half * max(gap, 0.0)
-                least[m, n, i] = here - room[m, n, i]
-                wanted[m, n, i] = here - half * max(gap - spare, 0.0)
+                least[m, n, i] = here - half * max(gap, 0.0)
+                spared = here - half * max(gap - spare, 0.0)
+                wanted[m, n, i] = max(least[m, n, i], min(spared, _dot(c, committed[n, i])))
 
 
 @kernel(VOID, array(3), array(3), output(3))

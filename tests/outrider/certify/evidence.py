@@ -1,16 +1,17 @@
-"""Evidence without a flight: who told what, and everybody heard it."""
+"""Evidence without a flight: who told and stated what, and everybody heard it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.committed import carried_on, controls, resting
+from companion.avoidance.certified.committed import carried_on, controls, resting, rests
 from companion.values.horizon import Array
+from mavlink_bridge.wire.agreements import Entry, Epochs, Statement
 from mavlink_bridge.wire.plan import Integers, WirePlan
-from outrider.certify.evidence import Evidence, FarewellChange, Log, LoggedPlan, Terms
+from outrider.certify.evidence import Evidence, FarewellChange, Log, LoggedPlan, LoggedStatement, Terms
 
 DT = EPOCH = 200_000
 """µs."""
@@ -20,6 +21,25 @@ REQUIRED = 1.2
 COPIES = 4
 """A plan is told so often."""
 TERMS = Terms((11, 12), frozenset(), DT, EPOCH, STEPS, 7, REQUIRED, (2000, 2000, 2000), False)
+
+
+ABOUT_AGREEMENTS = frozenset(
+    {
+        "a new beginning that is not stated",
+        "a departure without a farewell",
+        "a plan beyond agreed planes",
+        "a plan without a statement",
+        "a plan without an agreement",
+        "a statement heard that its sender did not tell",
+        "a statement in another frame",
+        "an agreement dropped",
+        "an agreement nearer than the one before",
+        "an agreement on a plan newer than the own one",
+        "an agreement on a plan that was not heard",
+        "an agreement on a plan that was not sent",
+        "an agreement taken again",
+    }
+)
 
 
 def standing(place: Sequence[float], epoch: int = BEGAN) -> WirePlan:
@@ -45,17 +65,103 @@ def evidence(
     terms: Terms = TERMS,
     words: Mapping[int, Sequence[FarewellChange]] | None = None,
 ) -> Evidence:
-    """Every plan of every vehicle is told half an epoch before it begins, and heard by all."""
-    said = words or {}
-    logs = []
-    for owner in sent:
-        sightings = [
-            LoggedPlan(owner, sender, plan, plan.epoch - EPOCH // 2, COPIES)
-            for sender, plans in sent.items()
-            for plan in plans
+    """Every plan of every vehicle is told half an epoch before it begins, and heard by all.
+
+    Then all that told one state their agreements, with one on the new plans of each two, and state them once
+    more when they have heard each other's.
+    """
+    told = Told(sent, terms._replace(fleet=tuple(sent)))
+    for epoch in sorted({plan.epoch for plans in sent.values() for plan in plans}):
+        told.of_epoch({system: [p for p in plans if p.epoch == epoch] for system, plans in sent.items()})
+    return told.evidence(words or {})
+
+
+class Told:
+    """Logs of vehicles that all hear each other, as they are written epoch by epoch."""
+
+    def __init__(self, systems: Iterable[int], terms: Terms) -> None:
+        self._terms, self._number = terms, 0
+        self._plans: dict[int, list[LoggedPlan]] = {system: [] for system in systems}
+        self._statements: dict[int, list[LoggedStatement]] = {system: [] for system in systems}
+        self._last: dict[int, WirePlan] = {}
+        self._since = dict.fromkeys(self._plans, 0)
+        self._heard_since = dict(self._since)
+        self._lists: dict[tuple[int, int], tuple[Epochs, ...]] = {}
+
+    def plan(self, sender: int, plan: WirePlan) -> None:
+        """A plan, told by ``sender`` and heard by all."""
+        self._number += 1
+        for owner, plans in self._plans.items():
+            plans.append(LoggedPlan(owner, sender, plan, plan.epoch - EPOCH // 2, COPIES, self._number))
+
+    def state(self, sender: int, statement: Statement, time: int | None = None) -> None:
+        """A statement, told by ``sender`` and heard by all."""
+        self._number += 1
+        at = statement.epoch - EPOCH // 2 if time is None else time
+        for owner, statements in self._statements.items():
+            statements.append(LoggedStatement(owner, sender, statement, at, self._number))
+
+    def of_epoch(self, plans: Mapping[int, Sequence[WirePlan]]) -> None:
+        """The plans of one epoch, and then the statements, twice."""
+        speak = {}
+        for sender, sent in plans.items():
+            for plan in sent:
+                self.plan(sender, plan)
+                if _sound(plan):
+                    speak[sender] = plan
+        for sender, plan in speak.items():
+            last = self._last.get(sender)
+            goes_on = None if last is None else carried_on(last, (plan.epoch - last.epoch) // DT)
+            if goes_on is None or (plan.position, plan.velocity) != (goes_on.position, goes_on.velocity):
+                self._since[sender] = plan.epoch
+            self._last[sender] = plan
+        for again in (False, True):
+            for sender, plan in speak.items():
+                entries = [self._entry(sender, peer, again=again) for peer in self._plans if peer != sender]
+                self.state(
+                    sender, Statement(self._terms.frame, plan.epoch, self._since[sender], tuple(entries))
+                )
+            self._heard_since = dict(self._since)
+
+    def _entry(self, sender: int, peer: int, *, again: bool) -> Entry:
+        old = self._lists.get((sender, peer), ())
+        kept = [one for one in old if one[0] >= self._since[sender] and one[1] >= self._heard_since[peer]]
+        own, other = self._last[sender], self._last.get(peer)
+        if other is not None and own.epoch == other.epoch:
+            both = own.epoch, own.epoch
+            kept = [both] if again else [*kept, both]
+        self._lists[sender, peer] = tuple(kept)
+        return Entry(peer, tuple(kept), kept[-1] if kept else (0, 0))
+
+    def evidence(self, words: Mapping[int, Sequence[FarewellChange]] | None = None) -> Evidence:
+        """All logs; ``words`` by system."""
+        logs = [
+            Log(
+                owner,
+                tuple(plans),
+                tuple(self._statements[owner]),
+                (),
+                tuple((words or {}).get(owner, ())),
+                0,
+            )
+            for owner, plans in self._plans.items()
         ]
-        logs.append(Log(owner, tuple(sightings), (), tuple(said.get(owner, ())), 0))
-    return Evidence(terms._replace(fleet=tuple(sent)), tuple(logs))
+        return Evidence(self._terms, tuple(logs))
+
+
+def _sound(plan: WirePlan) -> bool:
+    known = plan.origin == TERMS.origin and plan.dt == DT and len(plan.accelerations) == STEPS
+    return known and plan.epoch % EPOCH == 0 and rests(plan)
+
+
+def restated(whole: Evidence, change: Callable[[LoggedStatement], Statement | None]) -> Evidence:
+    """All statements as ``change`` has them, None to leave one out."""
+    logs = []
+    for log in whole.logs:
+        pairs = [(one, change(one)) for one in log.statements]
+        changed = tuple(one._replace(statement=new) for one, new in pairs if new is not None)
+        logs.append(log._replace(statements=changed))
+    return whole._replace(logs=tuple(logs))
 
 
 def least_of_samples(one: WirePlan, other: WirePlan, count: int = 41) -> float:

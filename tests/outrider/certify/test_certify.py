@@ -1,4 +1,6 @@
-"""The verdict on plans, without a flight: what is certified, and what is found."""
+"""The verdict on plans, without a flight: what is certified, and what is found.
+
+What is found about agreements has a file of its own."""
 
 from __future__ import annotations
 
@@ -14,8 +16,10 @@ from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.wire.plan import Integers, WirePlan, pack, unpack
 from outrider.certify.evidence import Evidence, FarewellChange, Log, UnreadablePayloads
 from outrider.certify.histories import Kind
-from outrider.certify.verdict import Verdict, judge
+from outrider.certify.verdict import Verdict
+from outrider.certify.verdict import judge as judge_all
 from tests.outrider.certify.evidence import (
+    ABOUT_AGREEMENTS,
     BEGAN,
     EPOCH,
     REQUIRED,
@@ -36,6 +40,13 @@ FAR = (0.0, 5.0, 0.0)
 EAST: list[Integers] = [(1000, 0, 0)] * 5 + [(-1000, 0, 0)] * 5
 """A metre."""
 A, B = standing((0.0, 0.0, 5.0)), standing((3.0, 0.0, 5.0))
+
+
+def judge(whole: Evidence) -> Verdict:
+    """The verdict, but for what is found about agreements."""
+    verdict = judge_all(whole)
+    left = tuple(finding for finding in verdict.findings if finding.what not in ABOUT_AGREEMENTS)
+    return verdict._replace(findings=left)
 
 
 def whats(verdict: Verdict) -> list[str]:
@@ -332,7 +343,7 @@ def test_neither_the_order_of_the_logs_nor_that_of_the_vehicles_matters(
 
 
 def test_no_evidence_is_no_certificate() -> None:
-    verdict = judge(Evidence(TERMS, (Log(11, (), (), (), 0),)))
+    verdict = judge(Evidence(TERMS, (Log(11, (), (), (), (), 0),)))
     assert not verdict.certified
     assert verdict.document()["least_m"] is None
     assert np.isfinite([verdict.seconds(finding.time) for finding in verdict.findings]).all()

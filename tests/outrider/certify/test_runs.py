@@ -6,6 +6,7 @@ import json
 import shutil
 import sys
 from collections.abc import Callable, Iterator
+from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,9 +14,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.peer_plans import PeerPlans
+from companion.avoidance.certified import flight
+from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.negotiation import AgreedPlans
+from companion.avoidance.certified.pair import Agreement, Pair
+from companion.avoidance.certified.peer_plans import StoredPlan
 from mavlink_bridge.messages import Message, Tunnel
 from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import Entry
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE
 from outrider.__main__ import main
@@ -23,6 +30,7 @@ from outrider.certify.command import show
 from outrider.certify.reading import read
 from outrider.certify.verdict import judge
 from outrider.errors import InputError
+from outrider.scenarios.options import Options, apply
 from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
 from tests.outrider.shipped import FIREFLY, scenario
@@ -38,18 +46,31 @@ Replay = Callable[..., Ended]
 Change = Callable[[Tunnel], Tunnel | None]
 
 
-def fly(directory: Path, vehicles: int, *, airborne: bool = True) -> Path:
+CERTIFIED = Options(avoidance="certified")
+PLANAR = CERTIFIED._replace(planar=True)
+LOSSY = PLANAR._replace(loss=0.3, delay_ms=60.0)
+SLOW = PLANAR._replace(loss=0.6, delay_ms=200.0)
+
+
+def fly(
+    directory: Path,
+    vehicles: int,
+    *,
+    airborne: bool = True,
+    seed: int = 1,
+    cap_s: float = 5.0,
+    options: Options = CERTIFIED,
+) -> Path:
     """A swap of places, as the command flies it."""
     directory.mkdir()
     of = scenario(
         "antipodal-8",
         vehicles=vehicles,
         airborne=airborne,
-        cap_s=5.0,
+        cap_s=cap_s,
         starts={"radius": 3.0, "jitter": 0.0},
-        companion={"avoidance": "certified"},
     )
-    swarm.fly(Prepared(of, FIREFLY), 1, directory, lambda _stage, _seconds: None)
+    swarm.fly(Prepared(apply(of, options), FIREFLY), seed, directory, lambda _stage, _seconds: None)
     return directory
 
 
@@ -117,6 +138,10 @@ def _messages(records: list[Record]) -> Iterator[tuple[Record, Message | None]]:
 
 def plans_of(system: int) -> Callable[[Tunnel], bool]:
     return lambda tunnel: tunnel.payload_type == PAYLOAD_TYPE and tunnel.source.system == system
+
+
+def states(system: int) -> Callable[[Tunnel], bool]:
+    return lambda tunnel: tunnel.payload_type == AGREEMENTS and tunnel.source.system == system
 
 
 def test_a_flight_is_certified(flown: Path, replay: Replay) -> None:
@@ -218,12 +243,142 @@ def test_lost_copies_change_nothing_but_a_lost_plan_is_found(run: Path, replay: 
     assert "did not tell" in finding["what"]
 
 
+def test_what_a_vehicle_has_not_heard_it_cannot_count_on(run: Path, replay: Replay) -> None:
+    """The statements of 12 are gone from the log of 11, which made its plans nevertheless."""
+    rewrite(run / "vehicle-11.tlog", lambda tunnel: None if states(12)(tunnel) else tunnel)
+    ended = replay(run, "--certify", "--json")
+    assert ended.status == 1
+    found = json.loads(ended.out)["findings"]
+    assert {"a plan without an agreement", "an agreement dropped"} == {one["what"] for one in found}
+    assert all(one["who"] == [11, 12] for one in found)
+
+
+def test_a_vehicle_that_states_nothing_is_found(run: Path, replay: Replay) -> None:
+    for log in run.glob("*.tlog"):
+        rewrite(log, lambda tunnel: None if states(13)(tunnel) else tunnel)
+    ended = replay(run, "--certify", "--json")
+    assert ended.status == 1
+    found = json.loads(ended.out)["findings"]
+    assert [13, 11, 12] in [one["who"] for one in found if one["what"] == "a plan without a statement"]
+
+
+@pytest.mark.parametrize(("seed", "options"), [(1, PLANAR), (1, LOSSY), (2, LOSSY), (3, SLOW)])
+def test_flights_with_loss_and_delay_are_certified(seed: int, options: Options, tmp_path: Path) -> None:
+    run = fly(tmp_path / "run", 4, seed=seed, options=options)
+    said = judge(read(run, lambda _what, _share: None)).document()
+    assert said["findings"] == []
+    assert said["agreements"] > 100
+    # Each plan keeps at least one agreement with each of the three others.
+    assert said["planes_checked"] >= 3 * said["plans"]
+
+
+# Companions that break a rule
+
+Break = Callable[[pytest.MonkeyPatch], None]
+
+
+def without_planes(patch: pytest.MonkeyPatch) -> None:
+    """Nobody looks at the others' plans."""
+    patch.setattr(Agreements, "agreed", lambda self: [])
+
+
+def without_the_oldest_planes(patch: pytest.MonkeyPatch) -> None:
+    """Of several agreements with a peer, plans keep only the newest."""
+    agreed = Agreements.agreed
+
+    def newest(self: Agreements) -> list[AgreedPlans]:
+        counts = [len(peer.pair.kept) for _, peer in sorted(self._peers.items())]
+        whole = agreed(self)
+        return [whole[end - 1] for count, end in zip(counts, accumulate(counts), strict=True) if count]
+
+    patch.setattr(Agreements, "agreed", newest)
+
+
+def against_stale_plans(patch: pytest.MonkeyPatch) -> None:
+    """Planes are computed from a plan of the peer that is two epochs older."""
+    agreed = Agreements.agreed
+
+    def stale(self: Agreements) -> list[AgreedPlans]:
+        return [plans._replace(other=_older(self, plans.other)) for plans in agreed(self)]
+
+    def _older(self: Agreements, plan: StoredPlan) -> StoredPlan:
+        for peer in self._peers.values():
+            if peer.plans.get(plan.plan.epoch) is plan:
+                return peer.plans.get(plan.plan.epoch - 2 * self._config.epoch_us) or plan
+        return plan
+
+    patch.setattr(Agreements, "agreed", stale)
+
+
+def without_acknowledgements(patch: pytest.MonkeyPatch) -> None:
+    """A newer agreement replaces the older one before the peer has stated it."""
+
+    def succeed(self: Pair) -> None:
+        self.kept = self.kept[-1:]
+
+    patch.setattr(Pair, "_succeed", succeed)
+
+
+def without_agreements(patch: pytest.MonkeyPatch) -> None:
+    """Nobody waits for an agreement."""
+    patch.setattr(Agreements, "missing", lambda self: set())
+
+
+def without_refusals(patch: pytest.MonkeyPatch) -> None:
+    """What the peer has proposed is taken, whether or not the own plan keeps it."""
+    patch.setattr(flight, "keeps", lambda *_, **__: True)
+
+
+def withdrawn_unconsidered(patch: pytest.MonkeyPatch) -> None:
+    """An agreement is dropped when a statement of the peer lacks it, considered or not."""
+    receive = Pair.receive
+
+    def hasty(self: Pair, epoch: int, since: int, entry: Entry) -> bool:
+        stated = {Agreement(own, other) for other, own in entry.agreements}
+        self.kept = tuple(one for one in self.kept if one in stated)
+        return receive(self, epoch, since, entry)
+
+    patch.setattr(Pair, "receive", hasty)
+
+
+def taken_again(patch: pytest.MonkeyPatch) -> None:
+    """It is forgotten which agreements were considered."""
+    patch.setattr(Pair, "newer", lambda self, one, than: one not in self.kept)
+
+
+@pytest.mark.parametrize(
+    ("breaks", "whats"),
+    [
+        (without_planes, {"a plan beyond agreed planes"}),
+        (without_the_oldest_planes, {"a plan beyond agreed planes"}),
+        (against_stale_plans, {"a plan beyond agreed planes"}),
+        (without_refusals, {"a plan beyond agreed planes"}),
+        (without_acknowledgements, {"an agreement dropped", "a plan without an agreement"}),
+        (withdrawn_unconsidered, {"an agreement dropped"}),
+        (without_agreements, {"a plan without an agreement"}),
+        (taken_again, {"an agreement taken again"}),
+    ],
+)
+def test_companions_that_break_a_rule_are_found(
+    breaks: Break, whats: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Within twenty short flights with loss and delay."""
+    breaks(monkeypatch)
+    for seed in range(1, 21):
+        run = fly(tmp_path / str(seed), 3, seed=seed, cap_s=3.0, options=LOSSY if seed % 2 else SLOW)
+        verdict = judge(read(run, lambda _what, _share: None))
+        if whats & {finding.what for finding in verdict.findings}:
+            assert not verdict.certified
+            return
+    pytest.fail("twenty flights were certified")
+
+
 def test_who_replans_without_the_other_s_plan_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, replay: Replay
 ) -> None:
     """Head-on, and nobody waits for anybody's plan or looks at one."""
-    monkeypatch.setattr(PeerPlans, "missing", lambda self, epoch: set())
-    monkeypatch.setattr(PeerPlans, "plans", lambda self, epoch: {})
+    without_agreements(monkeypatch)
+    without_planes(monkeypatch)
     run = fly(tmp_path / "run", 2)
     ended = replay(run, "--certify", "--json")
     assert ended.status == 1

@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from companion.config import CompanionConfig
 from companion.flight.readiness import HEALTH, STREAMS
 from companion.values.phase import Phase
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key
 from mavlink_bridge.links.endpoints import Serial, UdpIn
-from mavlink_bridge.messages import CommandLong, Source
+from mavlink_bridge.messages import CommandLong, Source, Timesync, Tunnel
 from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 from outrider.errors import InputError
 from outrider.fly.link_budget import (
     FLEET,
     SHARE,
+    agreed,
     carried,
     doubts,
     doubts_of_autopilot,
@@ -35,6 +40,7 @@ from outrider.fly.link_budget import (
 from outrider.scenarios.fly_config import RADIOS, FleetOrigin, FlyConfig
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
+from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
 from tests.companion.bench import TARGET, Bench, seen_at
 from tests.outrider.said import Run
 from tests.outrider.shipped import FIREFLY
@@ -106,6 +112,43 @@ def test_who_misses_a_plan_still_has_the_one_before(radio) -> None:
 def test_plans_that_nobody_shares_take_no_room() -> None:
     silent = FAST.companion.model_copy(update={"shares_plan": False})
     assert said(silent, False) < 0.3 * said(FAST.companion, False)
+
+
+@pytest.mark.parametrize("vehicles", [2, 5, 8])
+def test_plans_and_statements_take_what_is_stated_and_hardly_less(vehicles: int) -> None:
+    """Of vehicles in certified mode that swap places, without loss.
+
+    What is stated at once to several vehicles may go in one message, which is less than what is counted.
+    """
+    turns = 2.0 * np.pi * np.arange(vehicles) / vehicles
+    starts = 6.0 * np.stack([np.cos(turns), np.sin(turns), np.zeros(vehicles)], axis=1)
+    swarm = Swarm(starts, Rough(delay=20_000), [Habits()] * vehicles, 1)
+    seconds = 5
+    swarm.run(seconds * 1_000_000, lambda _, system: -starts[system - 1])
+    one = Source(1, 1)
+    sizes = [len(Codec().encode(Tunnel(one, 0, 0, AGREEMENTS, payload))) for payload in swarm.sent]
+    clocks = vehicles * len(Codec().encode(Timesync(one, -1, -1)))
+    stated = agreed(swarm.config, False, vehicles) - clocks
+    assert 0.85 * stated < sum(sizes) / (seconds * vehicles) <= stated
+
+
+def test_more_vehicles_have_more_to_agree_on() -> None:
+    config = CompanionConfig(task="goto", avoidance="certified")
+    each = [said(config, False, vehicles) for vehicles in range(2, 20)]
+    assert all(before < after for before, after in pairwise(each))
+    # Of the field, whose plans are for all.
+    assert said(FAST.settings, False, 2) == said(FAST.settings, False, 200)
+    for baud in (115200, 460800, 921600):
+        number = carried(baud, config, False)
+        need = [n * said(config, False, n) + said_by_target(False) for n in (number, number + 1)]
+        assert need[0] <= room(baud) < need[1]
+
+
+def test_a_line_for_agreements_is_doubted_by_their_settings() -> None:
+    config = CompanionConfig(task="goto", avoidance="certified")
+    assert "companion.certified" in doubts(Serial("/dev/ttyUSB0", 460800), config, False)
+    with pytest.raises(InputError, match=r"too few for two vehicles.*repeat_us"):
+        doubts(Serial("/dev/ttyUSB0", 57600), config, False)
 
 
 def test_only_a_serial_line_is_doubted() -> None:

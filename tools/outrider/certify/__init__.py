@@ -1,5 +1,6 @@
-"""Certification of a run: takes a run directory, gives a verdict from the transmitted plans and rosters.
+"""Certification of a run: takes a run directory, gives a verdict from the transmitted plans and statements.
 
-The steps are directory → ``reading`` → ``evidence`` → ``histories`` (each vehicle's plans) → ``pairs`` (of
-one epoch) → ``verdict``. The package uses no code that makes plans.
+The steps are directory → ``reading`` → ``evidence`` → ``histories`` (each vehicle's plans) → ``lists`` (of
+agreements, from each vehicle's log) → ``agreed_planes`` (plans against agreements) and ``pairs`` (plans
+against plans) → ``verdict``. The package uses no code that makes plans or agreements.
 """

@@ -52,6 +52,8 @@ def show(name: str, verdict: Verdict) -> None:
         else f"{nearest.distance:.4f}, {nearest.who[0]} and {nearest.who[1]} at "
         f"{verdict.seconds(nearest.epoch):g} s",
         "required, m": f"{verdict.required:.4f}",
+        "agreements": verdict.agreements,
+        "plans checked against their planes": verdict.kept,
         "plans made": len(verdict.steps(Kind.FIRST, Kind.MADE, Kind.ANCHOR)),
         "plans carried on": len(verdict.steps(Kind.CARRIED_ON)),
         "anchors": len(anchors),

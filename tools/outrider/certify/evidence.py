@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from mavlink_bridge.wire.agreements import Statement
 from mavlink_bridge.wire.plan import Integers, WirePlan
 
 
@@ -12,9 +13,9 @@ class Terms(NamedTuple):
 
     ``fleet``: system ids that share committed plans, which are judged; ``apart``: system ids of moving
     obstacles, whose plans are not judged. ``dt``: time between knots (µs); ``epoch``: time between plans
-    (µs); ``steps``: number of knots of a plan; ``origin``: fingerprint of its frame; ``required``: least
-    distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²); ``upright``: whether
-    only horizontal distances count.
+    (µs); ``steps``: number of knots of a plan; ``frame``: 32-bit checksum of the fleet frame; ``required``:
+    least distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²); ``upright``:
+    whether only horizontal distances count.
     """
 
     fleet: tuple[int, ...]
@@ -22,16 +23,22 @@ class Terms(NamedTuple):
     dt: int
     epoch: int
     steps: int
-    origin: int
+    frame: int
     required: float
     a_max: Integers
     upright: bool
+
+    @property
+    def origin(self) -> int:
+        """Fingerprint of the fleet frame in a plan: the low 8 bits of its checksum."""
+        return self.frame & 0xFF
 
 
 class LoggedPlan(NamedTuple):
     """Plan of ``sender`` in the log of ``owner``.
 
-    ``time``: of its first copy (µs, the owner's clock); ``copies``: their number.
+    ``time``: of its first copy (µs, the owner's clock); ``copies``: their number; ``number``: number of the
+    first copy's record in the log.
     """
 
     owner: int
@@ -39,10 +46,24 @@ class LoggedPlan(NamedTuple):
     plan: WirePlan
     time: int
     copies: int
+    number: int
+
+
+class LoggedStatement(NamedTuple):
+    """Statement of ``sender`` in the log of ``owner``, at ``time`` (µs); ``number``: of its record.
+
+    Of a received statement without a farewell only the first copy counts.
+    """
+
+    owner: int
+    sender: int
+    statement: Statement
+    time: int
+    number: int
 
 
 class UnreadablePayloads(NamedTuple):
-    """Payloads of the type of plans or rosters that cannot be read.
+    """Payloads of the type of plans or statements that cannot be read.
 
     ``time``: of the first one (µs); ``copies``: their number.
     """
@@ -54,17 +75,21 @@ class UnreadablePayloads(NamedTuple):
 
 
 class FarewellChange(NamedTuple):
-    """Change at ``time`` (µs): from then on the owner's rosters have the farewell flag, or lack it."""
+    """Change at ``time`` (µs): from then on the owner's statements have the farewell flag, or lack it."""
 
     time: int
     farewell: bool
 
 
 class Log(NamedTuple):
-    """Contents of one vehicle's tlog; ``damaged``: number of records that could not be read."""
+    """Contents of one vehicle's tlog.
+
+    ``statements``: in the order of the log. ``damaged``: number of records that could not be read.
+    """
 
     owner: int
     sightings: tuple[LoggedPlan, ...]
+    statements: tuple[LoggedStatement, ...]
     garbled: tuple[UnreadablePayloads, ...]
     words: tuple[FarewellChange, ...]
     damaged: int

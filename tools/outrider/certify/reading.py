@@ -1,4 +1,4 @@
-"""Evidence from a run directory: the configuration gives the terms, the logs give the plans."""
+"""Evidence from a run directory: the configuration gives the terms, the logs give plans and statements."""
 
 from __future__ import annotations
 
@@ -12,12 +12,20 @@ from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Tunnel
 from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import unpack as unpack_plan
-from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
-from mavlink_bridge.wire.roster import unpack as unpack_roster
-from outrider.certify.evidence import Evidence, FarewellChange, Log, LoggedPlan, Terms, UnreadablePayloads
+from outrider.certify.evidence import (
+    Evidence,
+    FarewellChange,
+    Log,
+    LoggedPlan,
+    LoggedStatement,
+    Terms,
+    UnreadablePayloads,
+)
 from outrider.errors import Fault, InputError
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION, resolved
@@ -75,7 +83,7 @@ def terms_of(scenario: Scenario) -> Terms:
         certified.dt_us,
         certified.epoch_us,
         config.horizon.steps + 1,
-        FleetFrame(origin.latitude, origin.longitude, origin.altitude).fingerprint,
+        FleetFrame(origin.latitude, origin.longitude, origin.altitude).checksum,
         between(certified, config.field, limits),
         (x, y, z),
         config.planar,
@@ -87,26 +95,36 @@ class _Tally:
 
     def __init__(self, owner: int) -> None:
         self._owner = owner
-        self._plans: dict[tuple[int, bytes], tuple[int, int]] = {}
+        self._plans: dict[tuple[int, bytes], tuple[int, int, int]] = {}
+        self._received: set[tuple[int, bytes]] = set()
         self._garbled: dict[int, UnreadablePayloads] = {}
         self._words: list[FarewellChange] = []
-        self._roster = b""
+        self._statements: list[LoggedStatement] = []
 
-    def add(self, time: int, message: Tunnel) -> None:
-        """Add a TUNNEL of any kind."""
+    def add(self, number: int, time: int, message: Tunnel) -> None:
+        """Add a TUNNEL of any kind, from the record ``number``, of ``time`` (µs)."""
         sender, payload = message.source.system, message.payload
         if message.payload_type == PLAN:
-            first, copies = self._plans.get((sender, payload), (time, 0))
-            self._plans[sender, payload] = first, copies + 1
-        elif message.payload_type == ROSTER and sender == self._owner and payload != self._roster:
-            self._roster = payload
-            try:
-                farewell = unpack_roster(payload).farewell
-            except PlanWireError:
-                self._garble(sender, time, 1)
-                return
-            if farewell != (bool(self._words) and self._words[-1].farewell):
-                self._words.append(FarewellChange(time, farewell))
+            first, copies, at = self._plans.get((sender, payload), (time, 0, number))
+            self._plans[sender, payload] = first, copies + 1, at
+        elif message.payload_type == AGREEMENTS and (sender, payload) not in self._received:
+            self._state(number, time, sender, payload)
+
+    def _state(self, number: int, time: int, sender: int, payload: bytes) -> None:
+        try:
+            statement = unpack_statement(payload)
+        except PlanWireError:
+            self._garble(sender, time, 1)
+            return
+        self._statements.append(LoggedStatement(self._owner, sender, statement, time, number))
+        if sender != self._owner:
+            # A farewell counts only with its plan, which may arrive after the first copy.
+            if not statement.farewell:
+                self._received.add((sender, payload))
+            return
+        farewell = statement.farewell
+        if not statement.away and farewell != (bool(self._words) and self._words[-1].farewell):
+            self._words.append(FarewellChange(time, farewell))
 
     def _garble(self, sender: int, time: int, copies: int) -> None:
         bad = self._garbled.get(sender, UnreadablePayloads(self._owner, sender, time, 0))
@@ -115,12 +133,13 @@ class _Tally:
     def log(self, damaged: int) -> Log:
         """Return the contents; ``damaged`` records could not be read."""
         sightings = []
-        for (sender, payload), (time, copies) in self._plans.items():
+        for (sender, payload), (time, copies, number) in self._plans.items():
             try:
-                sightings.append(LoggedPlan(self._owner, sender, unpack_plan(payload), time, copies))
+                sightings.append(LoggedPlan(self._owner, sender, unpack_plan(payload), time, copies, number))
             except PlanWireError:
                 self._garble(sender, time, copies)
-        return Log(self._owner, tuple(sightings), tuple(self._garbled.values()), tuple(self._words), damaged)
+        garbled, words = tuple(self._garbled.values()), tuple(self._words)
+        return Log(self._owner, tuple(sightings), tuple(self._statements), garbled, words, damaged)
 
 
 def _read(owner: int, path: Path, at: Callable[[int], None]) -> Log:
@@ -134,6 +153,6 @@ def _read(owner: int, path: Path, at: Callable[[int], None]) -> Log:
             at(size)
         for message in codec.feed(record.frame):
             if isinstance(message, Tunnel):
-                tally.add(record.time, message)
+                tally.add(number, record.time, message)
     report = reader.report
     return tally.log(report.bad + report.truncated + codec.counters.bad)

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from outrider.certify import agreed_planes
 from outrider.certify.evidence import Evidence, Finding, Log, Terms
 from outrider.certify.histories import History, Kind, history
+from outrider.certify.lists import Listing, listings
 from outrider.certify.pairs import Pairs, check
 
 
 class Verdict(NamedTuple):
     """Verdict on a run; without ``findings``, which are in the order of time, the run is certified.
 
-    ``began``: the first epoch (µs), from which seconds are counted.
+    ``agreements``: number of them, each counted once for the two vehicles that list it. ``kept``: number of
+    pairs of a plan and an agreement that was checked. ``began``: the first epoch (µs), from which seconds are
+    counted.
     """
 
     histories: tuple[History, ...]
     pairs: Pairs
+    agreements: int
+    kept: int
     required: float
     damaged: int
     began: int
@@ -59,6 +65,8 @@ class Verdict(NamedTuple):
             "least_s": None if nearest is None else self.seconds(nearest.epoch),
             "least_between": None if nearest is None else list(nearest.who),
             "required_m": self.required,
+            "agreements": self.agreements,
+            "planes_checked": self.kept,
             "plans": len(self.steps(Kind.FIRST, Kind.MADE, Kind.ANCHOR)),
             "carried_on": len(self.steps(Kind.CARRIED_ON)),
             "anchors": len(self.steps(Kind.ANCHOR)),
@@ -81,14 +89,50 @@ def judge(evidence: Evidence) -> Verdict:
         findings += wrong
     pairs = check(histories, terms)
     began = min(pairs.epochs, default=0)
-    findings += [*pairs.findings, *_absent(histories, logs, began)]
-    findings.sort(key=lambda finding: (finding.time, finding.who))
+    listed, wrong = _listed(histories, terms, logs)
+    kept = agreed_planes.check(histories, listed, terms)
+    findings += [*pairs.findings, *wrong, *kept.findings, *_absent(histories, logs, began)]
+    findings.sort(key=lambda finding: (finding.time, finding.who, finding.what, finding.figures))
     damaged = sum(log.damaged for log in logs)
-    return Verdict(tuple(histories), pairs, terms.required, damaged, began, tuple(findings))
+    agreements = {frozenset(((one.owner, one.agreement[0]), (one.peer, one.agreement[1]))) for one in listed}
+    return Verdict(
+        tuple(histories),
+        pairs,
+        len(agreements),
+        kept.checked,
+        terms.required,
+        damaged,
+        began,
+        tuple(findings),
+    )
+
+
+def _listed(
+    histories: list[History], terms: Terms, logs: tuple[Log, ...]
+) -> tuple[list[Listing], list[Finding]]:
+    """Return the agreements in the lists of all vehicles, and what is wrong with the lists."""
+    by_system = {one.system: one for one in histories}
+    told = {log.owner: {s.statement for s in log.statements if s.sender == log.owner} for log in logs}
+    listed, findings = [], []
+    for log in logs:
+        heard: dict[int, list[int]] = {}
+        for one in log.statements:
+            if one.sender in told and one.statement not in told[one.sender]:
+                heard.setdefault(one.sender, []).append(one.time)
+        findings += [
+            Finding("a statement heard that its sender did not tell", (sender, log.owner), times[0], "")
+            for sender, times in heard.items()
+        ]
+        own = by_system.get(log.owner)
+        if own is not None:
+            found, wrong = listings(log, own, histories, terms)
+            listed += found
+            findings += wrong
+    return listed, findings
 
 
 def _strange(terms: Terms, logs: tuple[Log, ...]) -> list[Finding]:
-    """Return findings for unreadable plans and rosters, and for plans of unknown vehicles."""
+    """Return findings for unreadable plans and statements, and for plans of unknown vehicles."""
     known = terms.apart.union(terms.fleet)
     findings = [
         Finding("what is no plan was sent as one", (one.sender, one.owner), one.time, f"{one.copies} times")

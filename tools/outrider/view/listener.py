@@ -14,9 +14,9 @@ from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, ned_to_enu, yaw_to_enu
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, NamedValue, Tunnel
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
-from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 from outrider.logs.flight_modes import is_armed, reported_mode
 from outrider.scene.scene import LEAST_REACH, Scene
 from outrider.scene.snapshot import NO_PLAN, Array, Single, Snapshot, State, euler_attitude, padded
@@ -98,7 +98,7 @@ class Listener:
         self._scene_at = self._begun = self._next = -np.inf
 
     def poll(self, wall: float) -> Sequence[Scene | Snapshot]:
-        """Return a scene after a new vehicle or the first roster, and a snapshot at most once in PICTURE."""
+        """Return a scene after a new vehicle or the first agreements, and a snapshot once in PICTURE."""
         for link, datagrams, codec in self._links:
             for data in link.receive():
                 for message in codec.feed(data, whole=datagrams):
@@ -160,7 +160,7 @@ class Listener:
         The origin of the plan's frame is unknown: the median offset between vehicles and the first points of
         their plans gives it.
         """
-        self._certified |= said.payload_type == ROSTER
+        self._certified |= said.payload_type == AGREEMENTS
         if said.payload_type != PAYLOAD_TYPE:
             return
         try:

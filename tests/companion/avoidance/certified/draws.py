@@ -50,27 +50,10 @@ def swarms(draw: st.DrawFn, *, leave: bool = False) -> Swarm:
     """One that has flown."""
     k, seed = draw(st.integers(2, 5)), draw(st.integers(0, 2**16))
     rough = draw(roughs(k))
-    own = apart(draw(st.lists(habits(leave=leave), min_size=k, max_size=k)))
+    own = draw(st.lists(habits(leave=leave), min_size=k, max_size=k))
     swarm = Swarm(starts(k, seed), rough, own, seed, epoch=draw(st.sampled_from([200_000, 400_000])))
     swarm.run(UNTIL, goals(seed))
     return swarm
-
-
-def apart(habits: list[Habits]) -> list[Habits]:
-    """Keep vehicles whose absences overlap from returning: docs/certified.md names this gap of the proof.
-
-    A farewell is accepted for five epochs, at most 2 s.
-    """
-    found: list[Habits] = []
-    for one in habits:
-        overlaps = [
-            other
-            for other in found
-            if one.leaves < other.returns + 2_000_000 and other.leaves < one.returns + 2_000_000
-        ]
-        away = [other for other in (*overlaps, one) if other.leaves < NEVER]
-        found.append(one._replace(returns=NEVER) if len(away) > 1 else one)
-    return found
 
 
 def starts(count: int, seed: int) -> Array:

@@ -44,9 +44,11 @@ def scene(seed: int, limits: LimitsConfig = WIDE, *, wishes: int = 1) -> Scene:
     start = carried_on(random_plan(rng, here), int(rng.integers(0, 4)))
     count, spread = int(rng.integers(0, 8)), 10.0 ** rng.uniform(-0.3, 0.9)
     others = [later(random_plan(rng, here + spread * rng.normal(size=3))) for _ in range(count)]
+    own = controls(start)
     corridor = planes(
-        controls(start),
+        own,
         Others(
+            np.broadcast_to(own, (count, STEPS, 3, 3)),
             np.stack([np.zeros((STEPS, 3, 3)), *others])[1:],
             np.full((count, STEPS), rng.uniform(0.3, 2.0)),
             rng.uniform(size=count) < 0.8,
@@ -70,7 +72,10 @@ def jam(seed: int) -> Scene:
     gap = rng.choice([rng.uniform(0.3, d), d, d + 10.0 ** rng.uniform(-9, -2)])
     own, count = controls(start), len(around)
     apart = Others(
-        own + gap * around[:, None, None], np.full((count, STEPS), d), np.ones(count, dtype=np.bool_)
+        np.broadcast_to(own, (count, STEPS, 3, 3)),
+        own + gap * around[:, None, None],
+        np.full((count, STEPS), d),
+        np.ones(count, dtype=np.bool_),
     )
     state = State(start.position_m, start.velocity_m_s, np.zeros(3), start.accelerations_m_s2)
     return Scene(WIDE, start, state, planes(own, apart, CONFIG.spare), (wish(rng, here),))

@@ -10,10 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.avoidance.certified.agreements import AgreedPlans
 from companion.avoidance.certified.committed import carried_on, controls, horizon_of, resting
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.margins import between
-from companion.avoidance.certified.separating_planes import hull_distance
+from companion.avoidance.certified.pair import Agreement
+from companion.avoidance.certified.separating_planes import hull_distance, nearest
 from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
 from companion.config.certified import CertifiedConfig
@@ -22,13 +24,16 @@ from companion.values.horizon import Array
 from companion.world import View, World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import unpack
 from mavlink_bridge.wire.plan import WirePlan, pack
-from mavlink_bridge.wire.roster import PAYLOAD_TYPE as ROSTER
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS, curves
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 TICK = 20_000
 NEVER = 1 << 62
+EXACT = 1e-9
+"""m."""
 _NOTHING = View(None, None, None, None)
 
 
@@ -53,7 +58,8 @@ class Rough(NamedTuple):
 class Habits(NamedTuple):
     """Of one vehicle, µs of the run: when it is switched on, when it steers from, when it leaves; when it is
     not called, and when it may not steer (from, till); how far its clock is ahead. Until it steers it wanders
-    about its place by ``wanders`` m. When it ``returns`` it joins again where it is."""
+    about its place by ``wanders`` m. When it ``returns`` it joins again where it is. When its companion
+    ``restarts`` it has forgotten everything, and begins anew where the vehicle is."""
 
     on: int = 0
     steers: int = 0
@@ -63,17 +69,30 @@ class Habits(NamedTuple):
     ahead: int = 0
     wanders: float = 0.0
     returns: int = NEVER
+    restarts: int = NEVER
 
 
 class Made(NamedTuple):
-    """A plan that was made, or tried to be made, at ``since`` (µs of the run) in ``epoch``, and the plans it
-    was made beside."""
+    """A plan that was made, or tried to be made, at ``since`` (µs of the run) in ``epoch``: beside which
+    agreements, and beside the last plans of those that said farewell, by system; and whether it was found."""
 
     system: int
     since: int
     epoch: int
-    beside: Mapping[int, WirePlan]
+    beside: Mapping[int, tuple[Agreement, ...]]
+    left: Mapping[int, WirePlan]
+    begun: Mapping[int, int]
+    """Since when (µs) each other has begun anew, as this vehicle has heard."""
     found: bool
+
+
+class Kept(NamedTuple):
+    """That ``system`` keeps ``agreement`` with ``other`` with its plan of ``epoch`` (µs)."""
+
+    system: int
+    other: int
+    agreement: Agreement
+    epoch: int
 
 
 class Vehicle:
@@ -81,24 +100,38 @@ class Vehicle:
 
     def __init__(self, system: int, config: CompanionConfig, place: Array, habits: Habits) -> None:
         self.system, self.place, self.habits = system, place, habits
-        self.flight = CertifiedFlight(config, Source(system, COMPONENT), FLEET)
+        self._config = config
+        self._start()
         self.world = World(config, system, 0, FLEET)
         self.plans: dict[int, WirePlan] = {}
-        self.believed: dict[tuple[int, int], WirePlan] = {}
-        """What it took for the plan of whom (system) in which epoch."""
         self.contradictions = 0
         """Plans that it flew or told and that were not the one it had told or flown for that epoch."""
         self.inbox: list[tuple[int, int, Tunnel]] = []
         self.made: list[Made] = []
-        self._flying = False
+        self._begun: dict[int, int] = {}
+
+    def _start(self) -> None:
+        self.flight = CertifiedFlight(self._config, Source(self.system, COMPONENT), FLEET)
+        self._flying = self._restarted = False
 
     def step(self, since: int, goal: Array) -> list[Tunnel]:
+        if since >= self.habits.restarts and not self._restarted:
+            self._start()
+            self._restarted = True
+            # What arrived before is lost.
+            while self.inbox and self.inbox[0][0] <= since:
+                heappop(self.inbox)
         now = EPOCH + since + self.habits.ahead
-        flight, peers, commitment = self.flight, self.flight.peers, self.flight.commitment
+        flight, commitment = self.flight, self.flight.commitment
         while self.inbox and self.inbox[0][0] <= since:
-            flight.receive(now, heappop(self.inbox)[2])
-        for system, filed in peers.plans(commitment.epoch(now)).items():
-            self.believed[system, commitment.epoch(now)] = filed.plan
+            message = heappop(self.inbox)[2]
+            if message.payload_type == AGREEMENTS:
+                system, said = message.source.system, unpack(message.payload)
+                # After a farewell the last plan is flown on, which keeps all that was agreed.
+                told = not said.farewell and any(entry.peer == self.system for entry in said.entries)
+                begun = said.since if told else 0
+                self._begun[system] = max(self._begun.get(system, 0), begun)
+            flight.receive(now, message)
         leaving = self.habits.leaves <= since < self.habits.returns
         if leaving or within(since, self.habits.released):
             self._flying = False
@@ -117,15 +150,26 @@ class Vehicle:
         self._flying = True
         if steers and flight.due(now):
             epoch = flight.commitment.epoch(now)
-            beside = {system: filed.plan for system, filed in flight.peers.plans(epoch).items()}
+            beside = flight.agreements.kept()
+            left = {system: last.plan for system, last in flight.agreements.left.items()}
             found = flight.plan(now, standing(goal, None), self.world, _NOTHING)
-            self.made.append(Made(self.system, since, epoch, beside, found))
+            self.made.append(Made(self.system, since, epoch, beside, left, dict(self._begun), found))
 
     def _here(self, now: int, since: int) -> Array:
         epoch = self.flight.commitment.epoch(now)
         there = horizon_of(self.plan(epoch)).at(now).position if self.plans else self.place
         result: Array = there + self.habits.wanders * np.sin(1e-6 * since * np.array([7.0, 5.0, 3.0]))
         return result
+
+    def confirmed(self, system: int) -> bool:
+        """Whether it may plan beside ``system`` because of an agreement."""
+        return system in self.flight.agreements.members - self.flight.agreements.missing()
+
+    def keeps(self) -> list[tuple[int, Agreement, AgreedPlans]]:
+        """The agreements that it keeps now, with whom, and what it takes for their plans."""
+        agreements = self.flight.agreements
+        named = [(system, one) for system, kept in sorted(agreements.kept().items()) for one in kept]
+        return [(*one, plans) for one, plans in zip(named, agreements.agreed(), strict=True)]
 
     def plan(self, epoch: int) -> WirePlan:
         """What it flies in ``epoch``, called or not: its last plan goes on."""
@@ -163,6 +207,13 @@ class Swarm:
         self._rng, self._rough, self._serial = np.random.default_rng(seed), rough, count()
         self._phases = self._rng.integers(0, TICK, len(starts)).tolist()
         self.sent: list[bytes] = []
+        self.parted: list[tuple[int, int, int]] = []
+        """When (µs of the run) which two vehicles may plan without an agreement that both keep."""
+        self.kept: set[Kept] = set()
+        self.misled: list[tuple[int, int, int]] = []
+        """When (µs of the run) who flies beside whose last plan although that has made another."""
+        self.mistaken: list[Kept] = []
+        """Agreements of which somebody holds other plans than those that are flown."""
 
     def run(self, until: int, goals: Callable[[int, int], Array]) -> None:
         """From the beginning until ``until`` µs; ``goals`` by time and system."""
@@ -175,10 +226,37 @@ class Swarm:
                 for message in vehicle.step(since, goals(since, vehicle.system)):
                     self.sent.append(message.payload)
                     self._carry(since, vehicle, message)
+                self._record(since, vehicle)
+                self._check(since, vehicle)
+
+    def _record(self, since: int, one: Vehicle) -> None:
+        newest = one.flight.commitment.announced()
+        if newest is None or not one.plans:
+            return
+        if not one.habits.leaves <= since < one.habits.returns:
+            left = one.flight.agreements.left.items()
+            self.misled += [(since, one.system, s) for s, last in left if self._flies_another(s, last.plan)]
+        for system, agreement, plans in one.keeps():
+            kept = Kept(one.system, system, agreement, newest.epoch)
+            if kept in self.kept:
+                continue
+            self.kept.add(kept)
+            true = one.plans.get(agreement.own), self.vehicles[system - 1].plans.get(agreement.other)
+            if (plans.own.plan, plans.other.plan) != true:
+                self.mistaken.append(kept)
+
+    def _check(self, since: int, one: Vehicle) -> None:
+        own = one.flight.agreements.kept()
+        for other in self.vehicles:
+            theirs = other.flight.agreements.kept().get(one.system, ())
+            mine = own.get(other.system, ())
+            both = {a for a in mine if Agreement(a.other, a.own) in theirs}
+            if one.confirmed(other.system) and other.confirmed(one.system) and not both:
+                self.parted.append((since, one.system, other.system))
 
     def _carry(self, since: int, sender: Vehicle, message: Tunnel) -> None:
         rough, rng = self._rough, self._rng
-        unreceived = rough.mute + (rough.alone if message.payload_type == ROSTER else ())
+        unreceived = rough.mute + (rough.alone if message.payload_type == AGREEMENTS else ())
         mute = any(begin <= since < end and sender.system == whom for begin, end, whom in unreceived)
         for receiver in self.vehicles:
             if receiver is sender or receiver.system in rough.deaf:
@@ -206,6 +284,56 @@ class Swarm:
             least = min(least, hull_distance(pairs).min())
             least = min(least, np.linalg.norm(curves(pairs), axis=-1).min())
         return float(least)
+
+    def crossed(self) -> float:
+        """By how much (m) plans cross the planes of agreements that are kept, at most; negative if none does.
+
+        The planes are worked out anew from what is flown, by NumPy.
+        """
+        return max((self._crossed(kept) for kept in self.kept), default=-np.inf)
+
+    def _crossed(self, kept: Kept) -> float:
+        one, two = self.vehicles[kept.system - 1], self.vehicles[kept.other - 1]
+        newest, own, other = (
+            controls(carried_on(plan, (kept.epoch - plan.epoch) // plan.dt))
+            for plan in (
+                one.plans[kept.epoch],
+                one.plans[kept.agreement.own],
+                two.plans[kept.agreement.other],
+            )
+        )
+        relative = own - other
+        normals = nearest(relative)
+        gap = np.minimum(self.d, np.einsum("nk,nik->ni", normals, relative))
+        least = 0.5 * (np.einsum("nk,nik->ni", normals, own + other) + gap)
+        return float((least - np.einsum("nk,nik->ni", normals, newest)).max())
+
+    def abandoned(self) -> list[Made]:
+        """Plans that were made beside an agreement with another that is known to have begun anew since."""
+        return [
+            made
+            for made in self.made()
+            if any(one.other < made.begun.get(s, 0) for s, kept in made.beside.items() for one in kept)
+        ]
+
+    def _flies_another(self, system: int, last: WirePlan) -> bool:
+        """Whether the newest plan of ``system`` is not ``last``, carried on."""
+        vehicle = self.vehicles[system - 1]
+        at = max(last.epoch, *vehicle.plans)
+        return vehicle.plan(at) != carried_on(last, (at - last.epoch) // last.dt)
+
+    def faults(self) -> list[str]:
+        """What breaks the theorem, or a law that it follows from, in this run; each by its name."""
+        found = {
+            "separation": self.least() < self.d - EXACT,
+            "no agreement in common": bool(self.parted),
+            "other plans than those that are flown": bool(self.mistaken),
+            "a plan crosses a plane": self.crossed() > EXACT,
+            "a plan beside an abandoned one": bool(self.abandoned()),
+            "a last plan that is not flown on": bool(self.misled),
+            "two plans of an epoch": any(vehicle.contradictions for vehicle in self.vehicles),
+        }
+        return [name for name, broken in found.items() if broken]
 
     def made(self) -> list[Made]:
         """By all, each in its own order."""

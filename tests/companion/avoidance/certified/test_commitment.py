@@ -22,7 +22,7 @@ from companion.config.certified import CertifiedConfig
 from companion.config.planning import HorizonConfig, LimitsConfig
 from companion.values.horizon import Array, Motion, roll_out
 from mavlink_bridge.messages import Message, Source, Tunnel
-from mavlink_bridge.wire.roster import unpack
+from mavlink_bridge.wire.agreements import unpack
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
 from tests.companion.avoidance.certified.swarm import FLEET
 
@@ -30,7 +30,7 @@ LENGTH = 400_000
 SHIFT = LENGTH // DT
 CONFIG = CertifiedConfig(dt_us=DT, epoch_us=LENGTH)
 HERE = np.array([0.0, 0.0, 5.0])
-NOBODY = Others(np.zeros((0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, dtype=np.bool_))
+NOBODY = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, dtype=np.bool_))
 seeds = st.integers(0, 2**32 - 1)
 choices = st.lists(st.sampled_from(["plan", "hold", "wait", "sleep"]), max_size=12)
 
@@ -122,10 +122,10 @@ def test_anew_from_where_it_is_is_to_rest_and_from_the_next_epoch_on() -> None:
     assert replan(kept, HERE)
 
 
-def standing(apart: Array, *, shares: bool) -> Others:
-    """One that stands ``apart`` (3,) m, and from which 2 m are to be kept."""
+def standing(own: Array, apart: Array, *, shares: bool) -> Others:
+    """One that stands ``apart`` (3,) m from ``HERE``, from which 2 m are to be kept; ``own`` (n, 3, 3), m."""
     there = np.broadcast_to(HERE + apart, (1, STEPS, 3, 3))
-    return Others(there, np.full((1, STEPS), 2.0), np.array([shares]))
+    return Others(own[None], there, np.full((1, STEPS), 2.0), np.array([shares]))
 
 
 @given(seeds, st.sampled_from([1.0, 1.5, 1.999, 2.0, 2.001, 2.01, 2.3]), st.booleans())
@@ -136,11 +136,12 @@ def test_pulled_through_one_that_is_near_it_makes_plans_and_never_comes_nearer(
     kept, rng = commitment(), np.random.default_rng(seed)
     way = rng.normal(size=3)
     way /= np.linalg.norm(way)
-    other, goal = standing(near * way, shares=shares), HERE + 6.0 * way + rng.normal(size=3)
+    goal = HERE + 6.0 * way + rng.normal(size=3)
+    other = standing(kept.own(), near * way, shares=shares)
     least = hull_distance(kept.own() - other.controls[0]).min()
     for epoch in range(6):
         kept.turn(EPOCH + epoch * LENGTH)
-        assert replan(kept, goal, other)
+        assert replan(kept, goal, other._replace(own=kept.own()[None]))
         assert kept.following is not None
         distance = hull_distance(controls(kept.following) - other.controls[0])
         assert distance.min() >= min(least, 2.0) - 1e-9
@@ -211,7 +212,9 @@ class TestStanding:
         flight.stand(now, away)
         origin = FLEET.fingerprint
         assert flight.commitment.current == resting(now, DT, STEPS, away, origin)
-        assert not tunnels(flight, now)
+        # It is away, and begins anew: no plan is told before it steers.
+        (away_from_it,) = tunnels(flight, now)
+        assert unpack(away_from_it.payload).away
 
     def test_to_leave_a_plan_that_was_told_is_to_plan_anew_and_counted_once(self) -> None:
         """Of plans that nobody was told, as on the way up, nothing follows."""
@@ -228,7 +231,7 @@ class TestStanding:
             flight.stand(now + step * LENGTH, HERE + vector(0.0, step, 0.0))
         assert flight.commitment.anchored_anew == 1
 
-    def test_who_steers_no_more_tells_nothing_but_a_farewell(self) -> None:
+    def test_who_steers_no_more_tells_no_plan_but_that_it_is_away_or_a_farewell(self) -> None:
         """It may be flown by hand: nobody is to take its last plan for what it flies."""
         for leaving in (False, True):
             flight = self.flight()
@@ -237,14 +240,15 @@ class TestStanding:
             assert len(tunnels(flight, EPOCH)) == 2
             for now in range(EPOCH + 60_000, EPOCH + 3 * LENGTH, 60_000):
                 said = [one for one in flight.messages(now, farewell=leaving) if isinstance(one, Tunnel)]
-                assert bool(said) == leaving
-                if said and now >= EPOCH + LENGTH:
-                    assert unpack(said[1].payload).farewell
+                told = unpack(said[-1].payload)
+                assert (len(said), told.away) == ((2, False) if leaving else (1, True))
+                if now >= EPOCH + LENGTH:
+                    assert told.farewell == leaving
             # Landed, and handed over: the farewell was the last that was heard of it.
-            assert not tunnels(flight, EPOCH + 4 * LENGTH)
+            assert bool(tunnels(flight, EPOCH + 4 * LENGTH)) != leaving
             now = EPOCH + 5 * LENGTH
             flight.stand(now, HERE)
-            assert not tunnels(flight, now)
+            assert bool(tunnels(flight, now)) != leaving
             flight.due(now + 20_000)
             assert len(tunnels(flight, now + 20_000)) == 2
 

@@ -17,8 +17,8 @@ from companion.telemetry.sharing import position_message
 from companion.values.horizon import Array
 from companion.world import View, World
 from mavlink_bridge.messages import Source
+from mavlink_bridge.wire.agreements import Entry, Statement
 from mavlink_bridge.wire.plan import pack
-from mavlink_bridge.wire.roster import Roster
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
 from tests.companion.avoidance.certified.swarm import FLEET
 
@@ -41,12 +41,20 @@ def at(place: Array) -> Callable[[int], Array]:
     return lambda since: place
 
 
+def leave(flight: CertifiedFlight, end: Array) -> None:
+    """The other says farewell with a plan at rest at ``end`` (3,), m."""
+    agreements = flight.agreements
+    agreements.receive_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
+    farewell = Statement(FLEET.checksum, EPOCH, EPOCH, (Entry(OWN),), farewell=True)
+    agreements.receive_statement(EPOCH, LEFT, farewell)
+    assert agreements.left.keys() == {LEFT}
+
+
 def way(received: Callable[[int], Array | None], *, whom: int = LEFT, end: Array = END) -> Array:
     """Where the other flies (k, 3), every 20 ms, from 6 m before to 6 m behind the origin: one said farewell
     at ``end``, and ``whom`` is heard at ``heard`` by µs since, from 0.1 s before its last plan begins on."""
     flight, world = CertifiedFlight(CONFIG, Source(OWN, 195), FLEET), World(CONFIG, OWN, 0, FLEET)
-    flight.peers.receive_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
-    flight.peers.receive_roster(EPOCH, LEFT, Roster(EPOCH, frozenset({OWN}), farewell=True))
+    leave(flight, end)
     flight.stand(EPOCH, np.array([-6.0, 0.0, 5.0]))
     places = []
     for since in range(-100_000, 6_000_000, 20_000):
@@ -109,8 +117,7 @@ def test_who_was_carried_aside_after_landing_and_switched_off_keeps_nobody_away_
     end, goal = np.array([0.0, 12.0, 5.0]), np.array([6.0, 0.0, 5.0])
     place = end + np.array([0.0, off * LEAST, -5.0])
     flight, world = CertifiedFlight(CONFIG, Source(OWN, 195), FLEET), World(CONFIG, OWN, 0, FLEET)
-    flight.peers.receive_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
-    flight.peers.receive_roster(EPOCH, LEFT, Roster(EPOCH, frozenset({OWN}), farewell=True))
+    leave(flight, end)
     for since in range(0, 1_000_000, 20_000):
         said = position_message(Source(LEFT, 195), 1_000_000 + since, FLEET, place, np.zeros(3), None)
         world.receive(EPOCH + since, "swarm", said)

@@ -17,6 +17,7 @@ from companion.avoidance.certified.separating_planes import (
     Planes,
     along,
     hull_distance,
+    keeps,
     nearest,
     planes,
 )
@@ -140,7 +141,7 @@ class Pair:
         self.planes = [
             planes(
                 own,
-                Others(other[None], np.full((1, STEPS), self.d), np.array([share])),
+                Others(own[None], other[None], np.full((1, STEPS), self.d), np.array([share])),
                 SPARE,
                 upright=upright,
             )
@@ -175,12 +176,10 @@ def test_the_committed_plans_keep_to_their_sides(seed: int, upright: bool) -> No
     for p, own in zip(pair.planes, pair.points, strict=True):
         here = along(p.normals, own)
         np.testing.assert_allclose(here, np.einsum("mnk,nik->mni", p.normals, own), rtol=0.0, atol=1e-12)
-        assert p.room.min() >= 0.0
         assert (here >= p.least).all()
         assert (here >= p.wanted).all()
         assert (p.wanted >= p.least).all()
         assert (p.wanted <= p.least + SPARE + 1e-12).all()
-        np.testing.assert_allclose(here - p.least, p.room, rtol=0.0, atol=1e-12)
     if upright:
         # Where nothing separates them any direction is as good.
         assert not pair.planes[0].normals[0, pair.apart_now, 2].any()
@@ -204,3 +203,41 @@ def test_a_new_plan_and_one_that_is_carried_on_are_apart(seed: int) -> None:
 def test_from_what_shares_nothing_the_own_side_keeps_it_all(seed: int) -> None:
     pair = Pair(seed, shares=(False, False))
     pair.check(pair.drawn(0), pair.points[1])
+
+
+@given(seeds, st.booleans())
+def test_a_plan_keeps_an_agreement_if_it_is_on_its_side_of_every_plane(seed: int, upright: bool) -> None:
+    """The two plans of the agreement do, to the last bit, and any other that is drawn there."""
+    pair = Pair(seed, upright=upright)
+    distance = np.full((1, STEPS), pair.d)
+    for side in (0, 1):
+        own, other, p = pair.points[side], pair.points[1 - side], pair.planes[side]
+        assert keeps(own, own, other, distance, upright=upright)
+        inside = pair.drawn(side) + 1e-9 * p.normals[0][:, None]
+        assert keeps(inside, own, other, distance, upright=upright)
+        crossing = inside.copy()
+        segment, point = pair.rng.integers(0, STEPS), pair.rng.integers(0, 3)
+        normal = p.normals[0, segment]
+        beyond = normal @ inside[segment, point] - p.least[0, segment, point] + 1e-6
+        crossing[segment, point] -= beyond * normal
+        assert not keeps(crossing, own, other, distance, upright=upright)
+
+
+@given(seeds)
+def test_the_planes_of_an_agreement_do_not_depend_on_the_plan_that_is_replaced(seed: int) -> None:
+    """So plans that are made later, each at another time, are apart while both keep the agreement."""
+    pair = Pair(seed)
+    pair.points = [pair.drawn(0), pair.drawn(1)]
+    before = pair.planes
+    old = Pair(seed)
+    pair.planes = [
+        planes(
+            newest, Others(own[None], other[None], np.full((1, STEPS), pair.d), np.ones(1, np.bool_)), SPARE
+        )
+        for newest, own, other in zip(pair.points, old.points, old.points[::-1], strict=True)
+    ]
+    for now, then in zip(pair.planes, before, strict=True):
+        np.testing.assert_array_equal(now.normals, then.normals)
+        np.testing.assert_array_equal(now.least, then.least)
+        assert (now.wanted >= now.least).all()
+    pair.check(pair.drawn(0), pair.drawn(1))

@@ -13,10 +13,8 @@ from companion.avoidance.certified.committed import rests
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.draws import UNTIL, goals, starts, swarms
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.swarm import NEVER, Habits, Rough, Swarm
 
-EXACT = 1e-9
-"""m."""
 FLIGHTS = settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 ROUGH = [
     Rough(loss, delay, 0.2, ((2_000_000, 3_000_000, frozenset({1, 2})),))
@@ -35,55 +33,62 @@ def flown(rough: Rough, seed: int, *, vehicles: int = 4) -> Swarm:
     return swarm
 
 
+def check_arrived(swarm: Swarm, goal: Array, seconds: int) -> None:
+    """Of ``swarm``, which has flown for ``seconds``, all that are not frozen rest at ``goal`` (k, 3), m."""
+    last = EPOCH + seconds * 1_000_000 - swarm.config.certified.epoch_us
+    chosen = [vehicle for vehicle in swarm.vehicles if not vehicle.habits.frozen]
+    ends = np.array([vehicle.plan(last).positions_m()[1] for vehicle in chosen])
+    assert np.linalg.norm(ends - [goal[v.system - 1] for v in chosen], axis=1).max() < 0.2
+
+
 @FLIGHTS
 @given(swarms())
 def test_any_two_plans_are_apart_whatever_happens(swarm: Swarm) -> None:
-    assert swarm.least() >= swarm.d - EXACT
+    """Two that may plan keep an agreement in common, of the plans that are flown, and keep to its planes."""
+    assert not swarm.faults()
 
 
 @FLIGHTS
 @given(swarms(leave=True))
 def test_they_are_also_where_some_leave(swarm: Swarm) -> None:
-    """Who leaves flies its last plan to the end, and all others count on that."""
-    assert swarm.least() >= swarm.d - EXACT
+    """Who leaves flies its last plan to the end, and all others count on that; it may come back."""
+    assert not swarm.faults()
 
 
 @FLIGHTS
 @given(swarms(leave=True))
-def test_everybody_has_one_plan_for_an_epoch_and_it_is_what_all_others_take_for_it(swarm: Swarm) -> None:
-    """Bit by bit, told or carried on; of a vehicle that has left, nothing depends on what it believes."""
-    by_system = {vehicle.system: vehicle for vehicle in swarm.vehicles}
-    for vehicle in swarm.vehicles:
-        assert vehicle.contradictions == 0
-        left = range(EPOCH + vehicle.habits.leaves, EPOCH + vehicle.habits.returns)
-        for (system, epoch), plan in vehicle.believed.items():
-            if epoch not in left:
-                assert plan == by_system[system].plan(epoch)
-
-
-@FLIGHTS
-@given(swarms(leave=True))
-def test_who_lacks_a_plan_of_the_epoch_does_not_replan(swarm: Swarm) -> None:
+def test_who_lacks_an_agreement_does_not_replan(swarm: Swarm) -> None:
     everybody = {vehicle.system for vehicle in swarm.vehicles}
     for made in swarm.made():
-        assert set(made.beside) == everybody - {made.system}
-        for system, plan in made.beside.items():
-            assert plan == swarm.vehicles[system - 1].plan(made.epoch)
+        assert made.beside.keys() | made.left.keys() == everybody - {made.system}
+        assert not made.beside.keys() & made.left.keys()
+        assert all(made.beside.values())
 
 
-@pytest.mark.xfail(strict=True, reason="docs/certified.md: two vehicles are away together, and both return")
-def test_who_was_away_together_with_another_does_not_replan_beside_its_last_plan() -> None:
-    """Each has accepted the other's farewell; the second to return has not heard that the other is back."""
-    rough = Rough(0.0, 0, 0.0, (), mute=((1_300_000, 2_000_000, 1),))
-    habits = [
-        Habits(0, 0, leaves=1_000_000, returns=1_300_000),
-        Habits(0, 0, leaves=1_190_000, returns=1_490_000),
-    ]
-    swarm = Swarm(np.array([[0.0, 0.0, 5.0], [4.0, 0.0, 5.0]]), rough, habits, 0)
-    swarm.run(3_000_000, lambda _since, system: np.array([2.0, 3.0 * system, 5.0]))
-    for made in swarm.made():
-        for system, plan in made.beside.items():
-            assert plan == swarm.vehicles[system - 1].plan(made.epoch)
+AWAY = [
+    Habits(leaves=1_000_000, returns=1_300_000),
+    Habits(leaves=1_190_000, returns=1_490_000),
+]
+"""Two that are away together. Each hears the other's farewell."""
+
+
+@pytest.mark.xfail(strict=True, reason="both farewells are accepted, and neither hears of the other's return")
+def test_two_that_were_away_together_and_do_not_hear_each_other_since_stay_apart() -> None:
+    """From its return on nothing of 1 is heard, and from 1.45 s on it hears nothing."""
+    rough = Rough(cuts=((1_450_000, NEVER, frozenset({1})),), mute=((1_300_000, NEVER, 1),))
+    swarm = Swarm(np.array([[0.0, 0.0, 5.0], [4.0, 0.0, 5.0]]), rough, AWAY, 0)
+    before = np.array([[2.0, 3.0, 5.0], [2.0, 6.0, 5.0]])
+    after = np.array([9.0, 4.5, 5.0])
+    swarm.run(8_000_000, lambda since, system: after if since > 1_300_000 else before[system - 1])
+    assert not swarm.faults()
+
+
+def test_two_that_were_away_together_plan_again_once_they_hear_each_other() -> None:
+    swarm = Swarm(np.array([[0.0, 0.0, 5.0], [4.0, 0.0, 5.0]]), Rough(), AWAY, 0)
+    swarm.run(5_000_000, lambda _since, system: np.array([2.0, 3.0 * system, 5.0]))
+    assert not swarm.faults()
+    for vehicle in swarm.vehicles:
+        assert any(made.since > 3_000_000 for made in vehicle.made)
 
 
 @FLIGHTS
@@ -107,7 +112,7 @@ def test_seeded_flights_are_apart_and_get_somewhere(rough: Rough) -> None:
     made = 0
     for seed in range(2):
         swarm = flown(rough, seed)
-        assert swarm.least() >= swarm.d - EXACT
+        assert not swarm.faults()
         made += len(swarm.made())
     assert made > 0
 
@@ -132,11 +137,42 @@ def test_eight_opposite_on_a_circle_arrive_in_time(radius: float, seed: int, sec
     goal = places * (-1.0, -1.0, 1.0)
     swarm = Swarm(places, Rough(), [Habits()] * 8, seed)
     swarm.run(seconds * 1_000_000, lambda since, system: goal[system - 1])
-    last = EPOCH + seconds * 1_000_000 - 200_000
-    ends = np.array([vehicle.plan(last).positions_m()[1] for vehicle in swarm.vehicles])
-    assert np.linalg.norm(ends - goal, axis=1).max() < 0.2
-    assert swarm.least() >= swarm.d - EXACT
+    check_arrived(swarm, goal, seconds)
+    assert not swarm.faults()
     assert all(made.found for made in swarm.made())
+
+
+@pytest.mark.parametrize(
+    ("rough", "seconds"),
+    [
+        pytest.param(Rough(0.6, 100_000), 11, id="60 % lost, up to 100 ms late"),
+        pytest.param(Rough(0.0, 300_000), 11, id="up to 300 ms late, epochs of 200 ms"),
+    ],
+)
+def test_they_arrive_on_links_that_lose_and_delay(rough: Rough, seconds: int) -> None:
+    places = circle(8, 4.0)
+    goal = places * (-1.0, -1.0, 1.0)
+    swarm = Swarm(places, rough, [Habits()] * 8, 1)
+    swarm.run(seconds * 1_000_000, lambda since, system: goal[system - 1])
+    assert not swarm.faults()
+    check_arrived(swarm, goal, seconds)
+
+
+def test_one_that_is_silent_for_ever_does_not_stop_the_others() -> None:
+    """Of eight that cross a circle one is frozen on the way. The others keep to their sides of it for good,
+    and reach every place there, also past each other: two exchange their places, five return to theirs."""
+    stops, seconds = 2_000_000, 12
+    places = circle(8, 6.0)
+    after = places[[0, 1, 2, 5, 4, 3, 6, 7]]
+    swarm = Swarm(places, Rough(), [Habits(frozen=((stops, NEVER),)), *[Habits()] * 7], 1)
+    swarm.run(
+        seconds * 1_000_000,
+        lambda since, system: after[system - 1] if since > stops else -places[system - 1] * (1, 1, -1),
+    )
+    assert not swarm.faults()
+    check_arrived(swarm, after, seconds)
+    for vehicle in swarm.vehicles[1:]:
+        assert sum(made.found for made in vehicle.made if made.since > stops) > 40
 
 
 @pytest.mark.parametrize("rough", ROUGH[:3:2], ids=["clear", "lossy"])
@@ -188,15 +224,15 @@ def test_who_left_is_not_waited_for() -> None:
     leaving = Habits(leaves=1_000_000)
     swarm = Swarm(starts(3, 2), Rough(0.8, 100_000), [leaving, Habits(), Habits()], 2)
     swarm.run(9_000_000, goals(2))
-    assert swarm.least() >= swarm.d - EXACT
+    assert not swarm.faults()
     for vehicle in swarm.vehicles[1:]:
-        assert set(vehicle.flight.peers.left) == {1}
+        assert set(vehicle.flight.agreements.left) == {1}
         assert any(made.since > 4_000_000 for made in vehicle.made)
 
 
-def test_who_comes_back_makes_no_plan_before_all_others_count_with_it_again() -> None:
-    """What they told before its farewell says nothing: here no roster of 2 gets through from then on, and
-    nothing of 1 since it is back, but the plans of 2 do."""
+def test_who_comes_back_makes_no_plan_before_all_others_agree_with_it_anew() -> None:
+    """What they stated before its farewell says nothing: here no statement of 2 gets through from then on,
+    and nothing of 1 since it is back, but the plans of 2 do."""
     left, back, through = 600_000, 2_600_000, 5_000_000
     rough = Rough(mute=((back, through, 1),), alone=((left, through, 2),))
     swarm = Swarm(circle(2, 6.0), rough, [Habits(leaves=left, returns=back), Habits()], 2)
@@ -205,7 +241,4 @@ def test_who_comes_back_makes_no_plan_before_all_others_count_with_it_again() ->
     assert any(back <= since < through for since in made[2])
     assert not any(back <= since < through for since in made[1])
     assert any(since > through for since in made[1])
-    for one in swarm.made():
-        for system, plan in one.beside.items():
-            assert plan == swarm.vehicles[system - 1].plan(one.epoch)
-    assert swarm.least() >= swarm.d - EXACT
+    assert not swarm.faults()

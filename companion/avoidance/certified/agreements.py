@@ -1,0 +1,211 @@
+"""Agreements of a vehicle with all its peers: what was received, and what its plans must keep.
+
+A vehicle replans only if it and each member have an agreement that both state (``missing`` is empty). Members
+are the expected vehicles, the senders of plans and statements, and the vehicles that these name, all until
+their farewell. A vehicle that said farewell flies its last plan to the end and stays there; it needs no
+agreement before it has begun anew.
+"""
+
+from __future__ import annotations
+
+from companion.avoidance.certified.negotiation import AgreedPlans, Keeps, Negotiation
+from companion.avoidance.certified.pair import Agreement
+from companion.avoidance.certified.peer import Peer
+from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan, read, stored
+from companion.config.certified import CertifiedConfig
+from companion.errors import CompanionError
+from companion.values.refused_senders import RefusedSenders
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.wire.agreements import Entry, Statement
+from mavlink_bridge.wire.plan import WirePlan
+
+_OLDEST, _AHEAD = 12, 4
+"""Largest time (epochs) by which a received plan may begin before now, and after."""
+_FOREIGN_US = 5_000_000
+"""Time (µs) after a message of a foreign fleet during which its sender is reported."""
+
+
+class Agreements:
+    """Agreements of the vehicle ``own`` (system id) in a fleet frame with the 32-bit checksum ``frame``.
+
+    ``steps``: number of knots of every plan. ``since``: epoch (µs) of the first plan since which each own
+    plan began on the one before. ``refused`` counts the messages that were not accepted.
+    """
+
+    def __init__(self, own: int, config: CertifiedConfig, steps: int, frame: int, keeps: Keeps) -> None:
+        self._own, self._config, self._steps, self.frame = own, config, steps, frame
+        self._plans = PlanFile()
+        self._negotiation = Negotiation(self._plans, steps, keeps)
+        self._peers = {system: Peer(own, system) for system in set(config.fleet) - {own}}
+        self._members: frozenset[int] | None = None
+        self._foreign: dict[int, int] = {}
+        self.since = self.refused = 0
+
+    def receive_plan(self, now: int, system: int, payload: bytes) -> None:
+        """Receive a TUNNEL payload of kind plan.
+
+        Refuses and counts a plan that cannot be decoded, does not end at rest, differs from this vehicle's
+        settings (frame, dt, steps, epoch), is too far from ``now``, or differs from the stored plan of its
+        epoch.
+        """
+        peer = self._peers.get(system)
+        if peer is not None and peer.last_payload == payload:
+            # Most payloads repeat the last one.
+            peer.last_received = now
+            return
+        if system == self._own:
+            return
+        try:
+            plan, at_rest = read(payload)
+        except PlanWireError:
+            self.refused += 1
+            return
+        if not (at_rest and self._fits(now, system, plan.plan)):
+            self.refused += 1
+            return
+        peer = self._known(system)
+        if peer.receive_plan(now, plan):
+            peer.last_payload = payload
+        else:
+            self.refused += 1
+
+    def _fits(self, now: int, system: int, plan: WirePlan) -> bool:
+        """Return whether a plan is in the fleet's frame, on its knots, and of about ``now`` (µs)."""
+        epoch = self._config.epoch_us
+        if (
+            plan.origin != self.frame & 0xFF
+            or plan.dt != self._config.dt_us
+            or len(plan.accelerations) != self._steps
+            or plan.epoch % epoch
+        ):
+            self._foreign[system] = now
+            return False
+        return -_OLDEST * epoch <= plan.epoch - now <= _AHEAD * epoch
+
+    def receive_statement(self, now: int, system: int, statement: Statement) -> None:
+        """Receive a statement of ``system``; refuse one of another frame, or of a clock that is ahead."""
+        if system == self._own:
+            return
+        if statement.frame != self.frame:
+            self._foreign[system] = now
+            self.refused += 1
+        elif statement.epoch - now > _AHEAD * self._config.epoch_us:
+            self.refused += 1
+        elif self._known(system).receive(now, statement):
+            self._members = None
+
+    def _known(self, system: int) -> Peer:
+        if system not in self._peers:
+            self._peers[system] = Peer(self._own, system)
+            self._members = None
+        return self._peers[system]
+
+    def begin(self, since: int) -> None:
+        """Discard all agreements: the own plan of ``since`` (µs) does not begin on the one before."""
+        self.since = since
+        self._plans.clear()
+        for peer in self._peers.values():
+            peer.void()
+
+    def leave(self, epoch: int) -> None:
+        """Discard all agreements after the own farewell with the own plan of ``epoch`` (µs)."""
+        self.since = epoch + self._config.epoch_us
+        for peer in self._peers.values():
+            peer.void()
+
+    def made(self, plan: WirePlan) -> bool:
+        """File the own newest plan, which keeps all agreements of the lists; return whether it is new."""
+        newest = self._plans.newest
+        if newest is not None and newest.plan is plan:
+            return False
+        self._plans.add(stored(plan), {epoch for peer in self._peers.values() for epoch in peer.needed()})
+        return True
+
+    def update(self, now: int) -> None:
+        """Take, propose and refuse agreements, with the own newest plan."""
+        newest = self._plans.newest
+        if newest is None or newest.plan.epoch < self.since:
+            return
+        for peer in self._peers.values():
+            if peer.left is None and peer.plans.newest is not None and not peer.doubted(now):
+                self._negotiation.advance(now, peer, newest, self.since)
+
+    @property
+    def members(self) -> frozenset[int]:
+        """System ids of the peers that need an agreement: all known ones that have not said farewell."""
+        if self._members is None:
+            known = set(self._peers)
+            for peer in self._peers.values():
+                known.update(system for system, departed in peer.names.items() if not departed)
+            self._members = frozenset(known) - {self._own} - self.left.keys()
+        return self._members
+
+    @property
+    def left(self) -> dict[int, StoredPlan]:
+        """Last plans of the vehicles that said farewell, by system id."""
+        return {system: peer.left for system, peer in self._peers.items() if peer.left is not None}
+
+    @property
+    def away(self) -> frozenset[int]:
+        """Members whose vehicle another controller flies, which need not keep the agreements."""
+        return frozenset(system for system, peer in self._peers.items() if peer.away and peer.left is None)
+
+    def kept(self) -> dict[int, tuple[Agreement, ...]]:
+        """Return the agreements that the own plans keep, by system id, without those of departed vehicles."""
+        return {system: peer.pair.kept for system, peer in self._peers.items() if peer.left is None}
+
+    def missing(self) -> set[int]:
+        """Return the members without an agreement that both vehicles state."""
+        peers = ((system, self._peers.get(system)) for system in self.members)
+        return {system for system, peer in peers if peer is None or peer.pair.confirmed is None}
+
+    def outdated(self, now: int, epoch: int) -> bool:
+        """Return whether an agreement on the plans of ``epoch`` (µs) may soon replace an older one.
+
+        Vehicles from which nothing was received for ``gone_us`` are not counted.
+        """
+        return any(
+            peer.left is None
+            and peer.last_received is not None
+            and now - peer.last_received <= self._config.gone_us
+            and not self._negotiation.current(peer, epoch)
+            for peer in self._peers.values()
+        )
+
+    def agreed(self) -> list[AgreedPlans]:
+        """Return the plans of all agreements that are kept, in the order of system ids."""
+        found = []
+        for system, peer in sorted(self._peers.items()):
+            for one in peer.pair.kept:
+                plans = self._negotiation.plans_of(peer, one)
+                if plans is None:
+                    raise CompanionError(f"the plans of the agreement {one} with {system} are not filed")
+                found.append(plans)
+        return found
+
+    def unanswered(self) -> list[WirePlan]:
+        """Return the own plans of proposals without an answer, the oldest first, without the newest plan.
+
+        A peer needs the plan to take the proposal, and may not have received it.
+        """
+        epochs = {one.own for peer in self._peers.values() if peer.left is None for one in peer.pair.open}
+        found = [self._plans.get(epoch) for epoch in sorted(epochs)]
+        return [one.plan for one in found if one is not None and one is not self._plans.newest]
+
+    @property
+    def changed(self) -> bool:
+        """Whether an entry has changed since it was last stated."""
+        return any(peer.changed for peer in self._peers.values())
+
+    def entries(self, *, every: bool) -> tuple[Entry, ...]:
+        """Return the entries to state, ``every`` one or those that changed, and count them as stated."""
+        found = [peer.entry() for _, peer in sorted(self._peers.items()) if every or peer.changed]
+        if every:
+            found += [Entry(system) for system in sorted(self.members - self._peers.keys())]
+        return tuple(found)
+
+    def refused_senders(self, now: int) -> RefusedSenders:
+        """Return the senders whose plans are refused at ``now`` (µs)."""
+        doubled = (system for system, peer in self._peers.items() if peer.doubted(now))
+        foreign = (system for system, time in self._foreign.items() if now - time < _FOREIGN_US)
+        return RefusedSenders(tuple(sorted(doubled)), tuple(sorted(foreign)))

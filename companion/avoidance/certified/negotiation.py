@@ -1,0 +1,126 @@
+"""Negotiation of agreements with one peer: what is taken, what is proposed, and what is refused.
+
+The vehicle with the lower id of a pair leads. It proposes an agreement on the newest plans that it holds, and
+the other takes it if its newest plan still keeps it. Where both hold the two plans of one epoch, both propose
+the same agreement at once, which saves a message. If each proposed another one, it would bar the other's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from companion.avoidance.certified.pair import Agreement
+from companion.avoidance.certified.peer import Peer
+from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan
+from companion.values.horizon import Array
+
+_MOST_KEPT = 5
+"""Number of agreements of a pair with which nothing is proposed any more."""
+_OVERDUE = 0.5
+"""Round trips after which an unanswered proposal is followed by another."""
+
+Keeps = Callable[[Array, Array, Array], bool]
+"""Whether the newest own plan keeps the own side of the planes of a pair of plans, the own and the other.
+
+All are control points (n + 1, 3, 3), m, on the same knots.
+"""
+
+
+class AgreedPlans(NamedTuple):
+    """The two plans of an agreement: the own one and the peer's."""
+
+    own: StoredPlan
+    other: StoredPlan
+
+
+class Negotiation:
+    """Negotiation of one vehicle with each of its peers; ``plans``: its own, of ``steps`` knots each."""
+
+    def __init__(self, plans: PlanFile, steps: int, keeps: Keeps) -> None:
+        self._plans, self._steps, self._keeps = plans, steps, keeps
+
+    def advance(self, now: int, peer: Peer, newest: StoredPlan, since: int) -> None:
+        """Take an offer of ``peer`` that the ``newest`` own plan keeps, or propose or refuse one.
+
+        Offers on own plans of before ``since`` (µs) are void.
+        """
+        pair, epoch = peer.pair, newest.plan.epoch
+        refused = None
+        for one in pair.offers:
+            plans = self.plans_of(peer, one)
+            if one.epoch > epoch or one.own < since or plans is None or not pair.may_take(one):
+                continue
+            if self._kept(newest, plans, newest):
+                pair.take(one)
+                peer.changed = True
+                break
+            refused = refused or one
+        other = peer.plans.before(epoch)
+        if other is not None and self._worthwhile(now, peer, AgreedPlans(newest, other)):
+            peer.propose(now, Agreement(epoch, other.plan.epoch))
+        elif refused is not None and pair.newer(refused, pair.considered):
+            pair.refuse(refused)
+            peer.changed = True
+
+    def plans_of(self, peer: Peer, one: Agreement) -> AgreedPlans | None:
+        """Return the two plans of an agreement; None if one is not filed."""
+        own, other = self._plans.get(one.own), peer.plans.get(one.other)
+        return None if own is None or other is None else AgreedPlans(own, other)
+
+    def current(self, peer: Peer, epoch: int) -> bool:
+        """Return whether the only agreement is as good as one on the plans of ``epoch`` (µs)."""
+        if len(peer.pair.kept) != 1:
+            return False
+        if peer.pair.kept[0] == (epoch, epoch):
+            return True
+        agreed, newest = self.plans_of(peer, peer.pair.kept[0]), self.plans_of(peer, Agreement(epoch, epoch))
+        return agreed is not None and newest is not None and self._same(agreed, newest)
+
+    def _worthwhile(self, now: int, peer: Peer, plans: AgreedPlans) -> bool:
+        """Return whether an agreement on these newest plans of both is to be proposed."""
+        pair = peer.pair
+        one = Agreement(plans.own.plan.epoch, plans.other.plan.epoch)
+        if not pair.may_take(one) or len(pair.kept) >= _MOST_KEPT:
+            return False
+        if not pair.leads and one.own != one.other:
+            return False
+        if pair.kept:
+            last = self.plans_of(peer, pair.kept[-1])
+            if last is not None and self._same(last, plans):
+                return False
+        waiting = peer.waiting(now)
+        if waiting is not None and waiting <= _OVERDUE * peer.round_trip:
+            return False
+        return self._apart(peer, plans)
+
+    def _apart(self, peer: Peer, plans: AgreedPlans) -> bool:
+        """Return whether the newest plans of both are as far apart as the confirmed agreement demands.
+
+        The own plan keeps that agreement. A plan that the peer made before it took the agreement may not, and
+        planes between two near plans would keep only their distance.
+        """
+        confirmed = peer.pair.confirmed
+        if confirmed is None:
+            return True
+        before = self.plans_of(peer, confirmed)
+        return before is not None and self._kept(
+            plans.other, AgreedPlans(before.other, before.own), plans.own
+        )
+
+    def _same(self, before: AgreedPlans, after: AgreedPlans) -> bool:
+        """Return whether both plans of an agreement are the earlier ones, carried on."""
+        epoch = max(after.own.plan.epoch, after.other.plan.epoch)
+        return all(
+            one is two or bool((one.later(epoch, self._steps) == two.later(epoch, self._steps)).all())
+            for one, two in zip(before, after, strict=True)
+        )
+
+    def _kept(self, plan: StoredPlan, plans: AgreedPlans, newest: StoredPlan) -> bool:
+        """Return whether ``plan`` keeps the planes of an agreement from the begin of ``newest`` on, for ever.
+
+        ``plans``: first that of the vehicle of ``plan``. No plan begins later than ``newest``, so all rest in
+        the last of the n + 1 segments.
+        """
+        epoch, rows = newest.plan.epoch, self._steps + 1
+        return self._keeps(*(one.later(epoch, rows) for one in (plan, *plans)))

@@ -1,0 +1,141 @@
+"""One peer as a vehicle knows it: its plans, its statements, and the agreements with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from companion.avoidance.certified.pair import Agreement, Pair
+from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan
+from mavlink_bridge.wire.agreements import Entry, Statement
+
+_CONFLICT_US = 5_000_000
+"""Time (µs) after contradicting plans during which no agreement is made with their sender."""
+_SEEN = 8
+"""Number of a peer's statements of which repetitions are recognised."""
+_ROUND_TRIP_US = 200_000
+"""Round trip (µs) that is assumed before one was measured."""
+
+
+class Peer:
+    """State of the peer ``system`` as the vehicle ``own`` knows it.
+
+    ``names``: the vehicles of its entries, and whether it has accepted their farewells. ``left``: the last
+    plan of a peer that said farewell. ``away``: another controller flies it. ``last_received``: time (µs) of
+    its last plan or statement. ``round_trip`` (µs): from a proposal to its answer. ``changed``: the entry
+    about it has changed since it was last stated.
+    """
+
+    def __init__(self, own: int, system: int) -> None:
+        self._own = own
+        self.plans, self.pair = PlanFile(), Pair(own, system)
+        self.names: dict[int, bool] = {}
+        self.left: StoredPlan | None = None
+        self.away = False
+        self.last_received: int | None = None
+        self.last_payload = b""
+        self.round_trip = _ROUND_TRIP_US
+        self.changed = True
+        self._statement_epoch = 0
+        self._proposed: dict[Agreement, int] = {}
+        self._seen: dict[Statement, tuple[tuple[Agreement, ...], Agreement]] = {}
+        self._conflict: int | None = None
+
+    def doubted(self, now: int) -> bool:
+        """Return whether two vehicles with the peer's id have sent plans recently."""
+        return self._conflict is not None and now - self._conflict < _CONFLICT_US
+
+    def receive_plan(self, now: int, plan: StoredPlan) -> bool:
+        """File a plan of the peer.
+
+        Returns False if it contradicts a filed plan: two vehicles have this id. Then the agreements are
+        discarded; the own plan keeps them until there is a new one, because without an agreement it is
+        carried on.
+        """
+        if self.plans.add(plan, (one.other for one in self.pair.referenced())):
+            self.last_received = now
+            return True
+        self._conflict = now
+        self.void()
+        return False
+
+    def receive(self, now: int, statement: Statement) -> bool:
+        """Receive a statement of the peer; return whether names, farewell or return have changed.
+
+        A farewell means that the peer's plan of that epoch is its last. It is accepted with this plan, and if
+        no newer plan is known; it is repeated for receivers that do not hold the plan yet.
+        """
+        known = self.pair.kept, self.pair.considered
+        if self.left is None and self._seen.get(statement) == known:
+            # A repeated statement changes nothing.
+            self.last_received = now
+            return False
+        changed = self._receive_head(statement)
+        if statement.away:
+            self.last_received = now
+            return changed
+        if self.left is not None:
+            if statement.epoch <= self.left.plan.epoch:
+                return changed
+            if not statement.farewell:
+                self.left, changed = None, True
+        self.last_received = now
+        if statement.farewell:
+            return self._part(statement.epoch) or changed
+        for entry in statement.entries:
+            if entry.peer == self._own:
+                self.changed |= self.pair.receive(statement.epoch, statement.since, entry)
+                self._measure(now)
+        if len(self._seen) >= _SEEN:
+            self._seen.clear()
+        self._seen[statement] = self.pair.kept, self.pair.considered
+        return changed
+
+    def _receive_head(self, statement: Statement) -> bool:
+        """Receive what the newest statement alone tells; return whether the names have changed."""
+        if statement.epoch < self._statement_epoch:
+            return False
+        self._statement_epoch, self.away = statement.epoch, statement.away
+        before = dict(self.names)
+        self.names.update({one.peer: one.departed for one in statement.entries if one.peer != self._own})
+        return self.names != before
+
+    def _part(self, epoch: int) -> bool:
+        """Accept the farewell with the plan of ``epoch`` (µs) if no newer plan is known; return whether."""
+        plan = self.plans.get(epoch)
+        if plan is None or plan is not self.plans.newest:
+            return False
+        self.left = plan
+        self.void(epoch + 1)
+        return True
+
+    def void(self, others_since: int = 0) -> None:
+        """Discard all agreements with the peer, see ``Pair.void``."""
+        self.pair.void(others_since)
+        self._proposed.clear()
+        self.changed = True
+
+    def propose(self, now: int, one: Agreement) -> None:
+        """Take the agreement ``one``, which the peer has not stated."""
+        self.pair.take(one)
+        self._proposed[one] = now
+        self.changed = True
+
+    def waiting(self, now: int) -> int | None:
+        """Return the time (µs) since the newest unanswered proposal; None if each is answered."""
+        open_ = self.pair.open
+        return min((now - self._proposed.get(one, now) for one in open_), default=None)
+
+    def _measure(self, now: int) -> None:
+        """Measure the round trip of the proposals that the peer has answered."""
+        pending = set(self.pair.open)
+        for one in [one for one in self._proposed if one not in pending]:
+            self.round_trip += (now - self._proposed.pop(one) - self.round_trip) // 4
+
+    def entry(self) -> Entry:
+        """Return the entry to state about the peer, and count it as stated."""
+        self.changed = False
+        return self.pair.entry(departed=self.left is not None)
+
+    def needed(self) -> Iterable[int]:
+        """Return the epochs (µs) of the own plans that agreements and offers name."""
+        return (one.own for one in self.pair.referenced())

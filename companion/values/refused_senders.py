@@ -1,0 +1,16 @@
+"""Senders whose committed plans are refused."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class RefusedSenders(NamedTuple):
+    """Senders whose plans are refused, by system id.
+
+    ``doubled``: two vehicles send plans with the id. ``foreign``: plans are in another fleet frame, or on
+    other knots.
+    """
+
+    doubled: tuple[int, ...] = ()
+    foreign: tuple[int, ...] = ()

@@ -1,0 +1,151 @@
+"""Planes of agreements: each plan of a vehicle keeps those of all agreements in its lists.
+
+The planes are computed from the two plans of the agreement: for each segment, c points from the peer's plan
+to the own one along the shortest line between their hulls, and a control point q of a later own plan
+satisfies c·q ≥ c·own − max(c·(own − other) − d, 0)/2. After the last segment both plans and the plane rest.
+
+Two plans that keep one agreement are as far apart as its own two plans, up to d. So the two plans of a later
+agreement must not be nearer than those of the one before, or than d.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.avoidance.certified.committed import controls
+from companion.avoidance.certified.separating_planes import hull_distance, nearest
+from companion.values.horizon import Array
+from outrider.certify.evidence import Finding, Terms
+from outrider.certify.histories import History, Kind
+from outrider.certify.lists import Listing
+
+SLACK = 1e-6
+"""Tolerance for floating-point errors (m)."""
+
+
+class Kept(NamedTuple):
+    """Result: number of pairs of a plan and an agreement that were ``checked``."""
+
+    checked: int
+    findings: list[Finding]
+
+
+class _Breach(NamedTuple):
+    """Plans beyond the planes of one agreement: the epoch (µs) of the first, and how far (m) the worst is."""
+
+    epoch: int
+    beyond: float
+
+
+def check(histories: Sequence[History], listings: Sequence[Listing], terms: Terms) -> Kept:
+    """Check all plans of ``histories`` against the agreements that their senders list with them."""
+    points = _Points(histories, terms)
+    by_owner: dict[int, list[Listing]] = defaultdict(list)
+    findings: list[Finding] = []
+    for one in listings:
+        names = (one.owner, one.agreement[0]), (one.peer, one.agreement[1])
+        if all(name in points for name in names):
+            by_owner[one.owner].append(one)
+        else:
+            findings.append(_finding("an agreement on a plan that was not sent", one, one.first, ""))
+    findings += _weaker(points, histories, [one for found in by_owner.values() for one in found], terms)
+    checked = 0
+    for history in histories:
+        breaches: dict[Listing, _Breach] = {}
+        for step in history.steps:
+            epoch = step.plan.epoch
+            listed = [
+                one for one in by_owner[history.system] if max(one.first, *one.agreement) <= epoch <= one.last
+            ]
+            if not listed:
+                continue
+            checked += len(listed)
+            for one, beyond in zip(
+                listed, _beyond(points, history.system, epoch, listed, terms), strict=True
+            ):
+                if beyond > SLACK:
+                    first = breaches.get(one, _Breach(epoch, beyond))
+                    breaches[one] = _Breach(first.epoch, max(first.beyond, beyond))
+        findings += [
+            _finding("a plan beyond agreed planes", one, breach.epoch, f"{breach.beyond:.6f} m")
+            for one, breach in breaches.items()
+        ]
+    return Kept(checked, findings)
+
+
+def _finding(what: str, one: Listing, time: int, figures: str) -> Finding:
+    named = f"on plans of {one.agreement[0]} µs and {one.agreement[1]} µs"
+    return Finding(what, (one.owner, one.peer), time, ", ".join(part for part in (figures, named) if part))
+
+
+def _weaker(
+    points: _Points, histories: Sequence[History], listed: Sequence[Listing], terms: Terms
+) -> list[Finding]:
+    """Return the agreements whose two plans are nearer than those of an earlier one of the pair, and than d.
+
+    An agreement on a plan from before one of the two began anew sets no bound for those after.
+    """
+    begins = {
+        history.system: [step.plan.epoch for step in history.steps if step.kind in (Kind.FIRST, Kind.ANCHOR)]
+        for history in histories
+    }
+    keeps: dict[tuple[int, ...], float] = defaultdict(float)
+    findings = []
+    for one in listed:
+        epoch, (mine, others) = max(one.agreement), one.agreement
+        apart = points.later(one.owner, mine, epoch) - points.later(one.peer, others, epoch)
+        if terms.upright:
+            apart[..., 2] = 0.0
+        distance = float(hull_distance(apart).min())
+        runs = bisect(begins[one.owner], mine), bisect(begins[one.peer], others)
+        name = one.owner, one.peer, *runs
+        if distance < keeps[name] - SLACK:
+            figures = f"{distance:.6f} m, at least {keeps[name]:.6f} m"
+            findings.append(_finding("an agreement nearer than the one before", one, one.first, figures))
+        else:
+            keeps[name] = max(keeps[name], min(distance, terms.required))
+    return findings
+
+
+class _Points:
+    """Control points of all plans by vehicle and epoch."""
+
+    def __init__(self, histories: Sequence[History], terms: Terms) -> None:
+        self._dt, self._rows = terms.dt, terms.steps + 1
+        self._plans = {
+            (history.system, step.plan.epoch): step.plan for history in histories for step in history.steps
+        }
+        self._points: dict[tuple[int, int], Array] = {}
+
+    def __contains__(self, name: tuple[int, int]) -> bool:
+        return name in self._plans
+
+    def later(self, system: int, begins: int, epoch: int) -> Array:
+        """Return control points (rows, 3, 3), m, from ``epoch`` (µs) on, of the plan that ``begins`` (µs)."""
+        name = system, begins
+        if name not in self._points:
+            self._points[name] = controls(self._plans[name])
+        points = self._points[name]
+        indices = (epoch - begins) // self._dt + np.arange(self._rows)
+        result = points[np.minimum(indices, len(points) - 1)]
+        result[indices >= len(points)] = points[-1, 2]
+        return result
+
+
+def _beyond(points: _Points, system: int, epoch: int, listed: Sequence[Listing], terms: Terms) -> list[float]:
+    """Return how far (m) the plan of ``epoch`` (µs) is beyond the planes of each agreement; ≤ 0 is none."""
+    plan = points.later(system, epoch, epoch)
+    own = np.stack([points.later(system, one.agreement[0], epoch) for one in listed])
+    relative = own - np.stack([points.later(one.peer, one.agreement[1], epoch) for one in listed])
+    if terms.upright:
+        relative[..., 2] = 0.0
+    normals = nearest(relative.reshape(-1, 3, 3)).reshape(*relative.shape[:2], 1, 3)
+    room = 0.5 * np.maximum((normals * relative).sum(axis=-1) - terms.required, 0.0)
+    short: Array = (normals * (own - plan)).sum(axis=-1) - room
+    found: list[float] = short.max(axis=(1, 2)).tolist()
+    return found

@@ -1,0 +1,187 @@
+"""Lists of agreements of one vehicle, from the statements in its log: when one enters, and when one leaves.
+
+An agreement is written as the owner of the log writes it: epochs (µs) of its own plan and of the peer's. The
+records are gone through in their order, so a statement counts for those that follow it.
+
+- An agreement enters a list if it is newer than all that the list's statements have considered before, if
+  both plans are known to the vehicle, and if its newest plan is not older than either.
+- It leaves by succession (a newer one of the list was stated by the peer), withdrawal (the peer has
+  considered it, or a newer one, and its list lacks it), void (one of the two began anew after its plan) or
+  the peer's farewell.
+- A plan is made only if each peer that has not departed has stated an agreement of the list.
+- A vehicle that begins anew states this: ``since`` is later than its plans before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import chain, pairwise
+from typing import NamedTuple
+
+from mavlink_bridge.wire.agreements import Entry, Epochs, Statement
+from outrider.certify.evidence import Finding, Log, LoggedPlan, LoggedStatement, Terms
+from outrider.certify.histories import History, Kind
+
+_NONE: Epochs = (0, 0)
+
+
+class Listing(NamedTuple):
+    """Agreement of ``owner`` with ``peer``; ``first`` and ``last``: epochs (µs) of statements with it."""
+
+    owner: int
+    peer: int
+    agreement: Epochs
+    first: int
+    last: int
+
+
+class _Peer:
+    """What the log of ``owner`` has shown so far about its agreements with one peer."""
+
+    def __init__(self, owner: int, system: int) -> None:
+        self._owner, self.system = owner, system
+        self.listings: dict[Epochs, Listing] = {}
+        self._listed: tuple[Epochs, ...] = ()
+        self._considered = _NONE
+        self._own_since = self._since = 0
+        self._stated: set[Epochs] = set()
+        self._lacking: list[tuple[int, Epochs, frozenset[Epochs]]] = []
+        """Received: epoch of the statement, the newest considered agreement, and the list."""
+        self._plans: set[int] = set()
+        self._farewell: int | None = None
+        """Epoch of the last plan of a peer whose farewell was to be accepted."""
+
+    def _rank(self, one: Epochs) -> tuple[int, int]:
+        """Return the place of an agreement in the order of the pair."""
+        return sum(one), one[self._owner > self.system]
+
+    def receive_plan(self, epoch: int) -> None:
+        """Take note of a plan of the peer."""
+        self._plans.add(epoch)
+
+    def receive(self, statement: Statement) -> None:
+        """Take note of a statement of the peer."""
+        epoch = statement.epoch
+        if statement.farewell:
+            if self._plans and epoch == max(self._plans):
+                self._farewell, self._since = epoch, max(self._since, epoch + 1)
+            return
+        if self._farewell is not None and epoch > self._farewell:
+            self._farewell = None
+        if statement.since < self._since:
+            return
+        self._since = statement.since
+        for entry in statement.entries:
+            if entry.peer == self._owner:
+                stated = frozenset((own, other) for other, own in entry.agreements)
+                self._stated |= stated
+                self._lacking.append((epoch, entry.considered[::-1], stated))
+
+    def state(self, statement: Statement, entry: Entry) -> Iterable[tuple[str, str]]:
+        """Take note of an own entry; yield kind and figures of what the rules forbid."""
+        if statement.since > self._own_since:
+            self._own_since, self._considered = statement.since, _NONE
+        before, now = set(self._listed), set(entry.agreements)
+        for one in entry.agreements:
+            if one not in before:
+                yield from self._enters(statement, one)
+                self.listings.setdefault(
+                    one, Listing(self._owner, self.system, one, statement.epoch, statement.epoch)
+                )
+            self.listings[one] = self.listings[one]._replace(last=statement.epoch)
+        for one in self._listed:
+            if one not in now and not self._leaves(one, entry):
+                yield "an agreement dropped", self._named(one)
+        self._listed = entry.agreements
+        self._considered = max(self._considered, entry.considered, *entry.agreements, key=self._rank)
+        if entry.departed and self._farewell is None:
+            yield "a departure without a farewell", ""
+
+    def _enters(self, statement: Statement, one: Epochs) -> Iterable[tuple[str, str]]:
+        if self._rank(one) <= self._rank(self._considered):
+            yield "an agreement taken again", self._named(one)
+        if one[1] not in self._plans:
+            yield "an agreement on a plan that was not heard", self._named(one)
+        if max(one) > statement.epoch:
+            yield "an agreement on a plan newer than the own one", self._named(one)
+
+    def _void(self, one: Epochs) -> bool:
+        return one[0] < self._own_since or one[1] < self._since
+
+    def _leaves(self, one: Epochs, entry: Entry) -> bool:
+        rank = self._rank(one)
+        return (
+            self._void(one)
+            or entry.departed
+            or any(newer in self._stated and self._rank(newer) > rank for newer in entry.agreements)
+            or any(
+                epoch >= one[1] and one not in stated and self._rank(considered) >= rank
+                for epoch, considered, stated in reversed(self._lacking)
+            )
+        )
+
+    @property
+    def agreed(self) -> bool:
+        """Whether an agreement of the own list was stated by the peer, and is not void."""
+        return any(one in self._stated and not self._void(one) for one in self._listed)
+
+    def _named(self, one: Epochs) -> str:
+        return f"on plans of {one[0]} µs and {one[1]} µs"
+
+
+def listings(
+    log: Log, history: History, others: Sequence[History], terms: Terms
+) -> tuple[list[Listing], list[Finding]]:
+    """Return all agreements in the lists of the vehicle with this ``log`` and ``history``, and findings.
+
+    ``others``: histories of the other vehicles.
+    """
+    owner = log.owner
+    peers: dict[int, _Peer] = {}
+    sent = {other.system: {step.plan for step in other.steps} for other in others}
+    made = {step.plan.epoch for step in history.steps if step.kind is Kind.MADE}
+    named: dict[int, set[int]] = {epoch: set() for epoch in made}
+    unsaid = {
+        step.plan.epoch: before.plan.epoch
+        for before, step in pairwise(history.steps)
+        if step.kind in (Kind.FIRST, Kind.ANCHOR)
+    }
+    findings: list[Finding] = []
+    records: list[LoggedPlan | LoggedStatement] = sorted(
+        chain(log.sightings, log.statements), key=lambda record: record.number
+    )
+    for record in records:
+        sender = record.sender
+        if isinstance(record, LoggedPlan):
+            if sender != owner and record.plan in sent.get(sender, ()):
+                peers.setdefault(sender, _Peer(owner, sender)).receive_plan(record.plan.epoch)
+            continue
+        statement = record.statement
+        if statement.frame != terms.frame:
+            what = "a statement in another frame"
+            figures = f"checksum {statement.frame:08x}, the fleet's is {terms.frame:08x}"
+            findings += [Finding(what, (owner,), record.time, figures)] * (sender == owner)
+        elif statement.away:
+            continue
+        elif sender != owner:
+            peers.setdefault(sender, _Peer(owner, sender)).receive(statement)
+        else:
+            before = unsaid.pop(statement.epoch, None)
+            if before is not None and statement.since <= before:
+                findings.append(Finding("a new beginning that is not stated", (owner,), statement.epoch, ""))
+            for entry in statement.entries:
+                peer = peers.setdefault(entry.peer, _Peer(owner, entry.peer))
+                who = owner, peer.system
+                wrong = peer.state(statement, entry)
+                findings += [Finding(what, who, record.time, figures) for what, figures in wrong]
+                told = named.get(statement.epoch)
+                if told is None or peer.system in told:
+                    continue
+                told.add(peer.system)
+                if not (entry.departed or statement.farewell or peer.agreed):
+                    findings.append(Finding("a plan without an agreement", who, statement.epoch, ""))
+    for epoch, told in named.items():
+        silent = sorted(set(terms.fleet) - told - {owner})
+        if silent:
+            findings.append(Finding("a plan without a statement", (owner, *silent), epoch, ""))
+    return [one for peer in peers.values() for one in peer.listings.values()], findings
