@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from companion.avoidance.certified.fleet_clock import FleetClock
 from companion.config import CompanionConfig
 from companion.estimation.time_sync import RoundTrips
 from companion.flight.health_monitor import Change, HealthInputs, HealthMonitor, Reaction
@@ -51,7 +52,8 @@ class Reactions:
 class HealthChecks:
     """Health checks of the vehicle of ``pilot``, about every 100 ms.
 
-    ``reporter`` reports concerns and changes of the autopilot's limits.
+    ``reporter`` reports concerns and changes of the autopilot's limits. ``fleet_clock``: None where fleet
+    time is not measured.
     """
 
     def __init__(
@@ -62,7 +64,9 @@ class HealthChecks:
         avoidance: Avoidance,
         round_trips: RoundTrips,
         reporter: StatusReporter,
+        fleet_clock: FleetClock | None,
     ) -> None:
+        self._fleet_clock = fleet_clock
         self._world, self._pilot, self._avoidance = world, pilot, avoidance
         self._round_trips, self._reporter = round_trips, reporter
         self.monitor = HealthMonitor(config)
@@ -111,6 +115,7 @@ class HealthChecks:
             self._round_trips.unanswered(now),
             float(np.linalg.norm(avoidance.tracking.error)) if pilot.streaming else 0.0,
             world.neighbours.nearest(now, view.own),
+            None if self._fleet_clock is None else self._fleet_clock.trouble,
             avoidance.refused(now),
         )
 

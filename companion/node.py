@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
+from companion.avoidance.certified.fleet_clock import FleetClock
 from companion.avoidance.field.plan_log import PlanLog
 from companion.config import CompanionConfig
 from companion.config.planning import MethodName
@@ -19,6 +20,7 @@ from companion.health_checks import HealthChecks, report_silence
 from companion.planning.avoidance import Avoidance, Tally
 from companion.planning.certified import CertifiedAvoidance
 from companion.planning.field import FieldAvoidance
+from companion.planning.fleet_time import FleetTimeAvoidance
 from companion.planning.plan_times import PlanTimes
 from companion.planning.planning import Planning
 from companion.planning.setpoints import Setpoints
@@ -30,8 +32,9 @@ from companion.values.components import COMPONENT
 from companion.values.horizon import Horizon
 from companion.values.phase import Phase
 from companion.world import World
+from mavlink_bridge.clocks.system_clock import SystemClock
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, Source, Timesync
+from mavlink_bridge.messages import Message, Source, SystemTime, Timesync
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec, Counters
 from mavlink_bridge.wire.signing import Signing
@@ -43,7 +46,7 @@ class Companion:
     Links: ``autopilot``, ``swarm``, ``target``, ``ground``. ``stopwatch`` (ns) only measures how long
     planning takes, for metrics and summaries. ``signing`` is the companion's own instance for all links; the
     index of a link in ``LINKS`` is its link id. Without ``signing`` the companion accepts signed and unsigned
-    messages alike.
+    messages alike. ``system_clock`` reads the computer's clock, a source of fleet time where it is measured.
     """
 
     pilots: ClassVar[type[Pilot]] = Pilot
@@ -57,8 +60,10 @@ class Companion:
         fleet: FleetFrame,
         stopwatch: Callable[[], int],
         signing: Signing | None = None,
+        system_clock: SystemClock | None = None,
     ) -> None:
         self.config = config
+        self.system_clock = system_clock
         self.name = f"companion-{system}"
         self._source = own = Source(system, COMPONENT)
         self.world = world = World(config, system, target_system, fleet)
@@ -72,11 +77,19 @@ class Companion:
         self.pilot = pilot = self.pilots(config, own, fleet.altitude)
         self._metrics = Metrics(config, own)
         self._times = times = PlanTimes(stopwatch, self._metrics.note)
-        self.avoidance: Avoidance = (
-            CertifiedAvoidance(config, own, fleet, world, pilot, times)
-            if config.avoidance == "certified"
-            else FieldAvoidance(config, world, pilot, times)
+        self._fleet_clock = (
+            FleetClock(config.certified, own, system_clock)
+            if config.avoidance == "certified" and config.certified.fleet_time == "measured"
+            else None
         )
+        self.avoidance: Avoidance
+        if config.avoidance == "field":
+            self.avoidance = FieldAvoidance(config, world, pilot, times)
+        elif self._fleet_clock is None:
+            self.avoidance = CertifiedAvoidance(config, own, fleet, world, pilot, times)
+        else:
+            clock = self._fleet_clock
+            self.avoidance = FleetTimeAvoidance(config, own, fleet, world, pilot, times, clock)
         self._goals = Goals(config, system, pilot, self.avoidance.lookahead_s)
         self._orders = Orders(config, own, fleet, pilot, self._goals)
         self._planning = Planning(config, world, pilot, self._goals, self.avoidance)
@@ -84,7 +97,9 @@ class Companion:
         self._sharing = Sharing(config, own, fleet)
         self._round_trips = RoundTrips(own)
         self.reporter = StatusReporter(config.ground_messages, own)
-        self._checks = HealthChecks(config, world, pilot, self.avoidance, self._round_trips, self.reporter)
+        self._checks = HealthChecks(
+            config, world, pilot, self.avoidance, self._round_trips, self.reporter, self._fleet_clock
+        )
         self.health = self._checks.monitor
         self._reports_on = config.ground_messages.texts or config.ground_messages.values
         self._started = False
@@ -155,7 +170,9 @@ class Companion:
         view = self.world.at(now)
         commands = self.pilot.step(now, view)
         self.world.doubt = self.pilot.vehicle.positioning.radius + self.avoidance.tracking.excess
-        requests = self._round_trips.due(now, self.world.late)
+        requests: list[Message] = [*self._round_trips.due(now, self.world.late)]
+        if self._fleet_clock is not None:
+            requests += self._fleet_clock.requests(now)
         self._checks.step(now, view, late=now - self._setpoints.next_due)
         self._goals.forget(view)
         self._planning.step(now, view, cautious=self.health.blinkered)
@@ -200,15 +217,19 @@ class Companion:
                     continue
                 if link == "autopilot":
                     self.pilot.receive(message)
-                    if isinstance(message, Timesync):
+                    if isinstance(message, SystemTime | Timesync):
                         self._receive_time(now, message)
                         continue
                 if not avoidance.receive(now, link, message):
                     world.receive(now, link, message)
         return answers
 
-    def _receive_time(self, now: int, message: Timesync) -> None:
-        """Process a TIMESYNC that may answer this companion's request for the autopilot's time."""
+    def _receive_time(self, now: int, message: SystemTime | Timesync) -> None:
+        """Process SYSTEM_TIME, or a TIMESYNC that may answer a request for the autopilot's time."""
+        if self._fleet_clock is not None:
+            self._fleet_clock.receive(now, "autopilot", message)
+        if isinstance(message, SystemTime):
+            return
         answer = self._round_trips.receive(message)
         if answer is not None:
             self.world.answered(now, answer)

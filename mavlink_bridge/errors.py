@@ -28,7 +28,7 @@ class ScheduleError(BridgeError):
 class PlanWireError(BridgeError):
     """A value that does not fit into its TUNNEL payload, or bytes that are no such payload.
 
-    The payloads are plans, rosters and uncertainties.
+    The payloads are plans, rosters, uncertainties and fleet times.
     """
 
 

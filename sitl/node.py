@@ -28,6 +28,7 @@ from sitl.autopilot.flight_control import FlightControl
 from sitl.autopilot.home_commands import HomeCommands
 from sitl.autopilot.missions.service import MissionService
 from sitl.autopilot.navigation import Navigation
+from sitl.autopilot.own_clock import OwnClock
 from sitl.autopilot.parameters import ardupilot as ardupilot_parameters
 from sitl.autopilot.parameters import px4 as px4_parameters
 from sitl.autopilot.parameters.values import Values
@@ -122,6 +123,7 @@ class Autopilot:
             None if config.battery is None else Battery(config.battery, hover_speeds(vehicle).tolist())
         )
         control = FlightControl(config, self._firmware, navigation, plant.estimate, self._battery, reporter)
+        self._clock = OwnClock(config)
         self._commander, self._failsafes = control.commander, control.failsafes
         self._telemetry = Telemetry(usual_rates(config), self._firmware.reports_ekf)
         self._missions = MissionService(
@@ -166,6 +168,7 @@ class Autopilot:
             self._battery,
             self._missions.current,
             self._failsafes,
+            self._clock,
         )
         commands = self._services.commands | control.maneuvers.commands
         self._reception = Reception(
@@ -178,6 +181,7 @@ class Autopilot:
             navigation.following,
             self._services.handlers,
             self._firmware.set_mode_ack,
+            self._clock.stamp,
         )
         self._signing = signing = _resumed(signing, config, saved)
         self._trust = SigningSetup(
@@ -211,10 +215,11 @@ class Autopilot:
         """
         if self._boot is None:
             self._boot = now
+            self._clock.boot(now)
             self._telemetry.start(0)
         self._now = now - self._boot
         if self._signing is not None:
-            self._signing.present(self.config.epoch + self._now)
+            self._signing.present(self._clock.boot_epoch + self._now)
         self._plant.move(self._now, armed=self._commander.armed)
         self._watch()
         for datagram in inbox:
@@ -224,6 +229,8 @@ class Autopilot:
     def _watch(self) -> None:
         was_ready = self._commander.ready
         self._commander.watch(self._now, self._plant.vehicle.on_ground, self._plant.sensors.gps.located)
+        if self._commander.ready and self._plant.sensors.gps.fixed:
+            self._clock.locate(self._now)
         if self._commander.ready and not was_ready:
             self._telemetry.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
         if self._battery is not None and self._battery.due(self._now):
@@ -316,6 +323,10 @@ class Autopilot:
         The autopilot receives no indication. Raises IndexError and ValueError.
         """
         self._plant.vehicle.fail_rotor(index, left)
+
+    def shift_utc(self, by: int) -> None:
+        """Shift the UTC of SYSTEM_TIME by ``by`` (µs) from now on."""
+        self._clock.shift_utc(by)
 
     def shift_gps(self, offset_enu: Vector) -> None:
         """Set the error of GPS positions to ``offset_enu`` (m, fleet-local ENU); zero ends the fault.

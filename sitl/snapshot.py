@@ -12,6 +12,7 @@ from sitl.autopilot.commander import Commander
 from sitl.autopilot.failsafes import Failsafes
 from sitl.autopilot.firmware import Firmware, Mode
 from sitl.autopilot.guidance import Activity, Guidance
+from sitl.autopilot.own_clock import OwnClock
 from sitl.autopilot.plant import Plant
 from sitl.config.autopilot import AutopilotConfig
 from sitl.telemetry.reports import Snapshot
@@ -49,6 +50,7 @@ class SnapshotReader:
         battery: Battery | None,
         mission: Callable[[], MissionCurrent],
         failsafes: Failsafes,
+        clock: OwnClock,
     ) -> None:
         self._config = config
         self._source = source
@@ -61,6 +63,7 @@ class SnapshotReader:
         self._battery = battery
         self._mission = mission
         self._failsafes = failsafes
+        self._clock = clock
         self._version = version(source, config.flavour)
         self._rotors = len(vehicle.rotors)
         self._hovering = _squares(hover_speeds(vehicle).tolist())
@@ -80,7 +83,7 @@ class SnapshotReader:
         armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if commander.armed else 0
         return Snapshot(
             self._source,
-            now,
+            self._clock.stamp(now),
             plant.estimate(),
             self._origin,
             commander.ready,
@@ -102,7 +105,7 @@ class SnapshotReader:
             None if self._battery is None else self._battery.charge,
             self._throttle,
             0 if self._failsafes.breached else self._unbreached,
-            self._config.epoch,
+            self._clock.epoch,
             self._version,
             self._mission,
             commander.ready and (commander.armed or self._armable(now)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -25,6 +25,38 @@ class DeadlockConfig(Settings):
     down: Positive = Field(6.0, description="rad/s at which it turns back")
     speed: Positive = Field(2.0, description="m/s of the rest point towards the goal that is no stall")
     pushed: float = Field(0.2, ge=0.0, lt=1.0, description="share of the pull from which it counts as pushed")
+
+
+class TimeSourcesConfig(Settings):
+    """Sources of fleet time, where it is measured."""
+
+    reference: int | None = Field(
+        None,
+        ge=1,
+        le=255,
+        description="system id of the vehicle whose companion's clock is fleet time; null: fleet time is UTC",
+    )
+    system: bool = Field(True, description="the system clock, while its kernel says that it is disciplined")
+    autopilot_us: int | None = Field(
+        None,
+        ge=0,
+        le=10_000_000,
+        description="largest error of the autopilot's UTC when it was set, µs; null: it is not used, because"
+        " neither firmware bounds it",
+    )
+    autopilot_drift_ppm: int = Field(
+        100, ge=0, le=10_000, description="largest drift of the autopilot's UTC from its boot on"
+    )
+    drift_ppm: int = Field(100, ge=0, le=10_000, description="largest drift of two clocks against each other")
+    lateness_us: int = Field(
+        1_000,
+        ge=0,
+        le=1_000_000,
+        description="largest time from the start of a step, which dates messages, to their reading",
+    )
+    wrong: int = Field(
+        1, ge=0, le=100, description="number of wrong sources that are tolerated; always a minority"
+    )
 
 
 class CertifiedConfig(Settings):
@@ -66,6 +98,12 @@ class CertifiedConfig(Settings):
     )
     sigmas: float = Field(3.0, ge=0.0, le=6.0, description="k of k·σ of the position estimate")
     clock_us: int = Field(5_000, ge=0, le=100_000, description="µs that a clock may differ from fleet time")
+    fleet_time: Literal["own", "measured"] = Field(
+        "own",
+        description="own: the companion's clock; measured: from ``time_sources``, and the plan is held while"
+        " its error may exceed ``clock_us``",
+    )
+    time_sources: TimeSourcesConfig = TimeSourcesConfig()
     backup_hover_us: int = Field(
         10_000_000,
         ge=0,

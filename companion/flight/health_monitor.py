@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from companion.avoidance.certified.fleet_clock import TimeTrouble
 from companion.config import CompanionConfig
 from companion.flight.guard import Holding
 from companion.flight.vehicle import Vehicle
@@ -48,8 +49,8 @@ class HealthInputs(NamedTuple):
     origin has moved, the last time shifting the vehicle by ``displaced`` m; ``clock_lost``: µs that the
     autopilot's clock has lost in total; ``unanswered``: the autopilot's messages are late, and it does not
     answer whether its clock is the reason; ``error``: distance (m) of the vehicle from its set-points;
-    ``nearest``: system id and distance (m) of the nearest neighbour; ``refused``: senders whose plans are
-    refused.
+    ``nearest``: system id and distance (m) of the nearest neighbour; ``time_trouble``: why fleet time is not
+    good enough to make plans; ``refused``: senders whose plans are refused.
     """
 
     now: int
@@ -67,6 +68,7 @@ class HealthInputs(NamedTuple):
     unanswered: bool = False
     error: float = 0.0
     nearest: tuple[int, float] | None = None
+    time_trouble: TimeTrouble | None = None
     refused: RefusedSenders = RefusedSenders()
 
 
@@ -136,6 +138,7 @@ class HealthMonitor:
             self._slow_clock(s),
             self._late_messages(s),
             self._origin(s),
+            self._fleet_time(s),
             *self._refused(s),
             *self._others(s),
         ]
@@ -274,6 +277,11 @@ class HealthMonitor:
                 "origin True", "Own position has jumped: landing", Reaction.LAND, Severity.CRITICAL
             )
         return Concern("origin False", "The autopilot's origin has moved")
+
+    def _fleet_time(self, s: HealthInputs) -> Concern | None:
+        if s.time_trouble is None or s.phase in _ON_THE_GROUND:
+            return None
+        return Concern(f"fleet time {s.time_trouble.name}", s.time_trouble.value)
 
     def _others(self, s: HealthInputs) -> list[Concern]:
         limit = self._config.guard.neighbour_lost_us

@@ -43,15 +43,20 @@ A start does not require them: a vehicle may have neither.
 """
 
 
+UTC = 1_000_000
+"""Interval (µs) of SYSTEM_TIME, which is requested where it is a source of fleet time."""
+
+
 def _interval(message: int, interval: int) -> tuple[int, Params]:
     params = (float(message), float(interval), 0.0, 0.0, 0.0, 0.0, 0.0)
     return mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, params
 
 
 @lru_cache
-def _position_quality_requests(estimator_message: int) -> tuple[tuple[int, Params], ...]:
+def _optional_requests(estimator_message: int, utc: bool) -> tuple[tuple[int, Params], ...]:
     messages = mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, estimator_message
-    return tuple(_interval(message, HEALTH) for message in messages)
+    quality = [_interval(message, HEALTH) for message in messages]
+    return (*quality, *([_interval(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, UTC)] if utc else ()))
 
 
 _REQUIRED_REQUESTS = tuple(_interval(message, interval) for message, interval in STREAMS.items())
@@ -65,6 +70,8 @@ class Readiness:
         self._vehicle = vehicle
         self._commands = calls
         self._requests = Commands(calls.own)
+        certified = config.certified
+        self._utc = certified.fleet_time == "measured" and certified.time_sources.autopilot_us is not None
         self.limits = AutopilotLimits(config, vehicle, calls.own)
 
     def receive(self, ack: CommandAck) -> None:
@@ -82,7 +89,7 @@ class Readiness:
         return all(self._commands.answered(*call) for call in _REQUIRED_REQUESTS)
 
     def wishes(self, now: int) -> list[Message]:
-        """Return the next request for the messages about position quality, if one is due.
+        """Return the next request for the messages about position quality and time, if one is due.
 
         The caller must wait until ``received`` is true: an acknowledgement contains the command id alone, and
         required and optional messages are requested by the same command.
@@ -90,7 +97,7 @@ class Readiness:
         profile = self._vehicle.profile
         if profile is None or not self._vehicle.alive:
             return []
-        for call in _position_quality_requests(profile.estimator_message):
+        for call in _optional_requests(profile.estimator_message, self._utc):
             if not self._requests.answered(*call):
                 return self._requests.call(now, *call)
         return []

@@ -54,6 +54,8 @@ def accepts(
     wanted = _ACCEPTED_IDS.get(link, set())
     if link == "autopilot" and config.limits_from_autopilot:
         wanted = wanted | {mavlink.MAVLINK_MSG_ID_PARAM_VALUE}
+    if link == "autopilot" and config.certified.fleet_time == "measured":
+        wanted = wanted | {mavlink.MAVLINK_MSG_ID_SYSTEM_TIME}
     source = config.target_source
     distances = {mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE} if config.proximity is not None else set()
     traffic = {mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE} if config.traffic is not None else set()

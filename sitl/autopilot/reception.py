@@ -46,11 +46,13 @@ class Reception:
         following: Following,
         services: Mapping[type[Any], Callable[[Any, int], None]],
         set_mode_ack: int,
+        stamp: Callable[[int], int],
     ) -> None:
         """Set the handlers.
 
         ``services`` maps a type of message to its handler, which takes a message and its time of arrival
         (µs). ``set_mode_ack`` is the command that COMMAND_ACK names in answer to SET_MODE (11).
+        ``stamp`` returns what the autopilot's clock shows (µs since boot) at a time (µs since boot).
         """
         self._source = source
         self._outbox = outbox
@@ -61,6 +63,7 @@ class Reception:
         self._following = following
         self._services = services
         self._set_mode_ack = set_mode_ack
+        self._stamp = stamp
 
     def handle(self, message: Message, now: int, estimate: Estimate) -> None:
         """Handle a message that arrived at ``now`` (µs since boot), with the ``estimate`` of that time."""
@@ -76,7 +79,7 @@ class Reception:
                     self._following.receive(message, estimate.pose, now)
             case Timesync(tc1=0):
                 # Zero would make the reply a request.
-                self._outbox.append(Timesync(self._source, max(1, now * 1000), message.ts1))
+                self._outbox.append(Timesync(self._source, max(1, self._stamp(now) * 1000), message.ts1))
             case Ping(target_system=0):
                 system, component = message.source
                 self._outbox.append(Ping(self._source, message.time, message.sequence, system, component))

@@ -85,6 +85,18 @@ class AutopilotConfig(BaseModel):
         "at once", description="whether GPS and estimator are seen to come up before ``ready_after``"
     )
     epoch: int = Field(0, ge=0, description="Unix time of the boot (µs); 0: it does not know the time")
+    epoch_from_steps: bool = Field(
+        False, description="the times of steps are Unix times, so the first one is ``epoch``"
+    )
+    utc_error_us: int = Field(
+        0, ge=-600_000_000, le=600_000_000, description="by which its UTC is ahead when it is set, µs"
+    )
+    clock_drift_ppm: float = Field(
+        0.0,
+        ge=-10_000.0,
+        le=10_000.0,
+        description="by which its clock is fast; its time since boot and its UTC both run on it",
+    )
     battery: BatteryConfig | None = Field(None, description="none: its state is not told")
     battery_failsafe: BatteryFailsafeConfig = BatteryFailsafeConfig()
     fence: FenceConfig = FenceConfig()

@@ -21,6 +21,9 @@ LOSS = {"kind": "gps_loss", "vehicle": 11, "at_s": 1.0, "for_s": 2.0}
 JUMP = {"kind": "gps_jump", "vehicle": 12, "at_s": 1.0, "for_s": 2.0, "offset": [1.0, 2.0, 3.0]}
 MOTOR = {"kind": "motor", "vehicle": 13, "at_s": 0.5, "rotor": 2, "left": 0.25}
 CLOCK = {"kind": "clock", "vehicle": 12, "late_ms": 200.0, "drift_ppm": -50.0}
+UTC = {"kind": "utc_step", "vehicle": 11, "at_s": 1.5, "step_ms": -20.5}
+STEP = {"kind": "clock_step", "vehicle": 13, "at_s": 2.5, "step_ms": 5_000.0}
+AUTOPILOT = {"kind": "autopilot_clock", "vehicle": 12, "utc_error_ms": 5.5, "drift_ppm": -50.0}
 CUT = {"at_s": 2.0, "for_s": 4.0, "members": [11, 12]}
 
 
@@ -54,7 +57,10 @@ def struck(*faults: dict[str, Any], partitions: tuple[dict[str, Any], ...] = ())
         (LOSS, [(1_000_000, ("lose_gps",)), (3_000_000, ("regain_gps",))]),
         (JUMP, [(1_000_000, ("shift_gps", (1.0, 2.0, 3.0))), (3_000_000, ("shift_gps", (0.0, 0.0, 0.0)))]),
         (MOTOR, [(500_000, ("fail_rotor", 2, 0.5))]),
+        (UTC, [(1_500_000, ("shift_utc", -20_500))]),
+        (STEP, [(2_500_000, ("step_clock", 13, 5_000_000))]),
         (CLOCK, []),
+        (AUTOPILOT, []),
     ],
 )
 def test_each_concerns_one_and_ends_when_it_ends(fault: dict[str, Any], calls: list[Any]) -> None:
@@ -66,14 +72,14 @@ def test_a_partition_heals() -> None:
 
 
 @settings(deadline=None)
-@given(st.permutations([FREEZE, VANISH, LOSS, JUMP, MOTOR]))
+@given(st.permutations([FREEZE, VANISH, LOSS, JUMP, MOTOR, UTC, STEP]))
 def test_they_come_in_the_order_of_time(faults: list[dict[str, Any]]) -> None:
     of = scenario("antipodal-8", vehicles=3, faults=faults, partitions=(CUT,))
     found = events(of)
     assert [event.after for event in found] == sorted(event.after for event in found)
     begun = {id(event.what) for event in found if not event.over}
     assert begun == {id(event.what) for event in found}
-    assert len(found) == 10
+    assert len(found) == 12
     assert isinstance(found[0], Event)
 
 
@@ -86,6 +92,37 @@ def test_a_clock_that_is_off_is_off_from_the_start_and_the_others_within_bounds(
         assert 0 < abs(clock.offset) <= 2_000
         assert 0.0 < abs(clock.drift_ppm) <= 30.0
     assert clocks == [Fleet(of, FIREFLY, 5, LOGS).clock(k, 1_000_000) for k in range(3)]
+
+
+def test_an_autopilots_clock_and_utc_are_off_from_the_start() -> None:
+    measured = {"certified": {"fleet_time": "measured"}}
+    of = scenario("antipodal-8", vehicles=3, faults=[AUTOPILOT, {**AUTOPILOT, "vehicle": 13, "utc": False}])
+    assert not Fleet(of, FIREFLY, 5, LOGS).autopilot(0).config.epoch_from_steps
+    of = of.model_copy(update={"companion": of.companion.model_validate(measured)})
+    configs = [Fleet(of, FIREFLY, 5, LOGS).autopilot(k).config for k in range(3)]
+    assert [config.epoch_from_steps for config in configs] == [True, True, False]
+    assert [(config.utc_error_us, config.clock_drift_ppm) for config in configs[:2]] == [
+        (0, 0.0),
+        (5_500, -50.0),
+    ]
+
+
+def test_a_disciplined_system_clock_tells_a_bound_that_holds_until_it_steps() -> None:
+    of = scenario("antipodal-8", vehicles=3, faults=[CLOCK], clocks={"system_us": 3_000})
+    fleet, start = Fleet(of, FIREFLY, 5, LOGS), 1_000_000_000
+    for k in range(3):
+        system, own = fleet.system_clock(k, start), fleet.clock(k, start)
+        assert system is not None
+        for true in range(start, start + 60_000_000, 1_234_000):
+            now = own.local(true)
+            reading = system(now)
+            assert abs(now + reading.ahead - true) <= reading.bound
+            # 3 ms, and the kernel's 500 ppm between two corrections.
+            assert 3_000 <= reading.bound <= 3_000 + 8_000 + 4
+        system.step(-5_000_000)
+        assert system(now).ahead == reading.ahead - 5_000_000
+        assert system(now).bound == reading.bound
+    assert Fleet(scenario("antipodal-8"), FIREFLY, 5, LOGS).system_clock(0, start) is None
 
 
 def spell(what: dict[str, Any], begin: float, lasts: float) -> dict[str, Any]:

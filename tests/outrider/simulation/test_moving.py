@@ -222,7 +222,7 @@ def test_they_are_heard_on_the_swarm_link_with_faults_of_their_own() -> None:
 def test_in_real_time_they_come_through_the_companion_s_own_ether() -> None:
     fleet = Fleet(traffic(POST, vehicles=2), FIREFLY, 1, LOGS)
     (node,) = fleet.moving()
-    behind = rough(fleet, fleet.companion(0, lambda: 0), {"swarm": None})
+    behind = rough(fleet, fleet.companion(0, lambda: 0, 0), {"swarm": None})
     behind.step(START, node.step(START, []))
     assert behind.network.counters.sent == 1
     behind.step(START + 1_000_000, [])

@@ -15,6 +15,8 @@ from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.fleet_time import PAYLOAD_TYPE as FLEET_TIME
+from mavlink_bridge.wire.fleet_time import unpack as unpack_fleet_time
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import unpack as unpack_plan
 from outrider.certify.evidence import (
@@ -100,11 +102,18 @@ class _Tally:
         self._garbled: dict[int, UnreadablePayloads] = {}
         self._words: list[FarewellChange] = []
         self._statements: list[LoggedStatement] = []
+        self._ahead = 0
 
     def add(self, number: int, time: int, message: Tunnel) -> None:
-        """Add a TUNNEL of any kind, from the record ``number``, of ``time`` (µs)."""
+        """Add a TUNNEL of any kind, from the record ``number``, at ``time`` (µs) by the owner's clock.
+
+        Where the owner reports fleet time, all times are converted to it, as plans are in fleet time.
+        """
         sender, payload = message.source.system, message.payload
-        if message.payload_type == PLAN:
+        time += self._ahead
+        if message.payload_type == FLEET_TIME and sender == self._owner:
+            self._convert(payload)
+        elif message.payload_type == PLAN:
             first, copies, at = self._plans.get((sender, payload), (time, 0, number))
             self._plans[sender, payload] = first, copies + 1, at
         elif message.payload_type == AGREEMENTS and (sender, payload) not in self._received:
@@ -125,6 +134,14 @@ class _Tally:
         farewell = statement.farewell
         if not statement.away and farewell != (bool(self._words) and self._words[-1].farewell):
             self._words.append(FarewellChange(time, farewell))
+
+    def _convert(self, payload: bytes) -> None:
+        """Take the owner's fleet time; its receivers ignore one that they cannot decode, and so does this."""
+        try:
+            ahead = unpack_fleet_time(payload).ahead
+        except PlanWireError:
+            return
+        self._ahead = self._ahead if ahead is None else ahead
 
     def _garble(self, sender: int, time: int, copies: int) -> None:
         bad = self._garbled.get(sender, UnreadablePayloads(self._owner, sender, time, 0))

@@ -271,7 +271,7 @@ class _Leader:
                 board.gone[k] = 1
             conductor.abort(now, f"the process of {name} ended with status {status}")
 
-    # Faults of companions' computers; each companion's process applies partitions itself.
+    # Faults of companions' computers; each companion's process applies partitions and steps of its clock.
 
     def freeze(self, system: int) -> None:
         self._processes.freeze(names.companion(system))
@@ -283,6 +283,9 @@ class _Leader:
 
     def vanish(self, system: int) -> None:
         self._board.gone[self._fleet.systems.index(system)] = 1
+
+    def step_clock(self, system: int, by: int) -> None:
+        pass
 
     def cut(self, systems: tuple[int, ...]) -> None:
         pass

@@ -15,6 +15,7 @@ from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.wiring import Wiring
 from outrider.realtime.workers import AutopilotWorker, CompanionWorker, NodeEnvironment, PlayedWorker, Worker
 from outrider.runs import names
+from outrider.scenarios.faults import ClockStep
 from outrider.scenarios.links import PartitionPart
 from outrider.simulation.disturbances import events
 from outrider.simulation.fleet import Fleet
@@ -35,8 +36,9 @@ def spawn(
     cuts = [event for event in happening if isinstance(event.what, PartitionPart)]
     workers: list[Worker] = []
     for k, system in enumerate(fleet.systems):
-        autopilot, companion = fleet.autopilot(k), fleet.companion(k, time.thread_time_ns)
+        autopilot, companion = fleet.autopilot(k), fleet.companion(k, time.thread_time_ns, start)
         own = [event for event in happening if getattr(event.what, "vehicle", None) == system]
+        steps = [event for event in own if isinstance(event.what, ClockStep)]
         behind = rough(fleet, autopilot, {"autopilot": companion.name})
         first, phase, its_clock = turns(fleet, k, start)
         every = Scheduled(behind, timing.autopilot_us, first)
@@ -61,7 +63,7 @@ def spawn(
                 system,
                 logs,
                 NodeEnvironment(behind, every, wiring.companions[k], clock, board),
-                cuts,
+                sorted([*cuts, *steps], key=lambda event: event.after),
             )
         )
     for index, k in enumerate(fleet.with_backup):

@@ -38,6 +38,7 @@ from outrider.scene.view_commands import LOSSY
 from outrider.simulation.bystander import Bystander
 from outrider.simulation.disturbances import Event, strike_autopilot, strike_computer
 from outrider.simulation.moving import MovingObstacle
+from outrider.simulation.system_clocks import step_clock
 from outrider.simulation.targets import Target
 from sitl.node import Autopilot
 
@@ -232,8 +233,8 @@ class CompanionWorker(Worker):
         self._first = self._node.tally
 
     def strike(self, event: Event) -> None:
-        """Apply a partition to the companion's links."""
-        strike_computer(event, _SwarmPartition(self.rough))
+        """Apply a partition to the companion's links, or a step to its system clock."""
+        strike_computer(event, _OwnComputer(self.rough, self._node))
 
     def show(self, now: int) -> None:
         """Write the companion's state to the board and, if there is one, to the view."""
@@ -292,11 +293,14 @@ class PlayedWorker(Worker):
             self._node.move(now, window.place)
 
 
-class _SwarmPartition:
-    """Partitions of the swarm for one companion; the parent applies freezes and losses of processes."""
+class _OwnComputer:
+    """Partitions of the swarm, and steps of the system clock, for one companion.
 
-    def __init__(self, rough: ImpairedLink) -> None:
-        self._rough = rough
+    The parent applies freezes and losses of processes.
+    """
+
+    def __init__(self, rough: ImpairedLink, companion: Companion) -> None:
+        self._rough, self._companion = rough, companion
 
     def freeze(self, system: int) -> None:
         """Do nothing: the parent stops the process."""
@@ -306,6 +310,9 @@ class _SwarmPartition:
 
     def vanish(self, system: int) -> None:
         """Do nothing: the process ends by ``SharedPage.gone``."""
+
+    def step_clock(self, system: int, by: int) -> None:
+        step_clock(self._companion, by)
 
     def cut(self, systems: tuple[int, ...]) -> None:
         self._rough.cut(map(names.companion, systems))

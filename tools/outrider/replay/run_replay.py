@@ -14,6 +14,7 @@ from outrider.runs import names
 from outrider.runs.configuration import resolved
 from outrider.runs.steps_file import read_steps
 from outrider.simulation.fleet import Fleet
+from outrider.simulation.vehicles import EPOCH
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
@@ -43,7 +44,7 @@ def again(directory: Path, watch: Watch = lambda _words, _share: None) -> tuple[
         shares = _Shares(watch, names.log(system), (k, len(fleet.systems)), len(steps))
         records = read_tlog(directory / names.log(system))
         # The CPU clock returns 0: planning time is irrelevant here.
-        companion = fleet.companion(k, lambda: 0)
+        companion = fleet.companion(k, lambda: 0, EPOCH)
         found.append(replay_companion(companion, (system, COMPONENT), steps, records, shares.step))
     return tuple(found)
 

@@ -9,7 +9,17 @@ from outrider.report.clocks import seconds
 from outrider.report.distances import Encounter
 from outrider.report.log_events import sayings
 from outrider.report.run import Log, Run
-from outrider.scenarios.faults import ClockFault, Freeze, GpsJump, GpsLoss, MotorFailure, Sudden, Vanish
+from outrider.scenarios.faults import (
+    ClockStep,
+    Freeze,
+    FromStart,
+    GpsJump,
+    GpsLoss,
+    MotorFailure,
+    Sudden,
+    UtcStep,
+    Vanish,
+)
 from outrider.scenarios.places import FixedTarget
 from outrider.scenarios.scenario import Scenario
 
@@ -88,7 +98,7 @@ def _encounters(near: Sequence[Encounter]) -> Iterator[Event]:
 def _scenario(scenario: Scenario) -> Iterator[Event]:
     """Yield the events that the scenario's file defines, except clock faults, which last the whole flight."""
     for fault in scenario.faults:
-        if not isinstance(fault, ClockFault):
+        if not isinstance(fault, FromStart):
             until = getattr(fault, "for_s", None)
             end = None if until is None else fault.at_s + until
             yield Event(fault.at_s, "fault", (fault.vehicle,), _words(fault), end, bad=True)
@@ -117,6 +127,10 @@ def _words(fault: Sudden) -> str:
         return "its position fix is {:g}, {:g}, {:g} m off".format(*fault.offset)
     if isinstance(fault, MotorFailure):
         return f"rotor {fault.rotor} gives {100.0 * fault.left:g} % of its thrust from now on"
+    if isinstance(fault, UtcStep):
+        return f"its autopilot's UTC steps by {fault.step_ms:g} ms"
+    if isinstance(fault, ClockStep):
+        return f"its computer's system clock steps by {fault.step_ms:g} ms"
     raise TypeError(fault)
 
 

@@ -56,17 +56,46 @@ class MotorFailure(_Fault):
 class ClockFault(_OfVehicle):
     """Clock error of the companion: ``late_ms`` late (negative: early) from the start, ``drift_ppm`` fast.
 
-    The clock does not step in flight: a companion reads the time once and then uses its monotonic clock.
+    This clock does not step in flight: a companion reads the time once and then uses its monotonic clock.
+    The system clock, a source of fleet time, does (``clock_step``).
     """
 
     kind: Literal["clock"]
-    late_ms: float = Field(0.0, ge=-60_000.0, le=60_000.0)
+    late_ms: float = Field(0.0, ge=-600_000.0, le=600_000.0)
     drift_ppm: float = Field(0.0, ge=-10_000.0, le=10_000.0)
 
 
-Sudden = Freeze | Vanish | GpsLoss | GpsJump | MotorFailure
+class AutopilotClockFault(_OfVehicle):
+    """Clock error of the autopilot from the start.
+
+    Its UTC is ``utc_error_ms`` ahead when it is set, and its clock ``drift_ppm`` fast.
+    """
+
+    kind: Literal["autopilot_clock"]
+    utc_error_ms: float = Field(0.0, ge=-600_000.0, le=600_000.0)
+    drift_ppm: float = Field(0.0, ge=-10_000.0, le=10_000.0)
+    utc: bool = Field(True, description="false: it never learns UTC, as without GNSS time")
+
+
+class UtcStep(_Fault):
+    """Step of the autopilot's UTC by ``step_ms``: from then on SYSTEM_TIME is that much ahead."""
+
+    kind: Literal["utc_step"]
+    step_ms: float = Field(ge=-600_000.0, le=600_000.0)
+
+
+class ClockStep(_Fault):
+    """Step of the companion's system clock by ``step_ms``, while its kernel reports an unchanged error."""
+
+    kind: Literal["clock_step"]
+    step_ms: float = Field(ge=-600_000.0, le=600_000.0)
+
+
+Sudden = Freeze | Vanish | GpsLoss | GpsJump | MotorFailure | UtcStep | ClockStep
 """Faults that occur at a certain time."""
-FaultPart = Annotated[Sudden | ClockFault, Field(discriminator="kind")]
+FromStart = ClockFault | AutopilotClockFault
+"""Faults that last the whole flight."""
+FaultPart = Annotated[Sudden | FromStart, Field(discriminator="kind")]
 
 
 class Clocks(Part):
@@ -74,3 +103,9 @@ class Clocks(Part):
 
     offset_ms: float = Field(1.0, ge=0.0, le=1_000.0)
     drift_ppm: float = Field(20.0, ge=0.0, le=1_000.0)
+    system_us: int | None = Field(
+        None,
+        ge=0,
+        le=1_000_000,
+        description="largest error of the system clocks after a correction; null: nobody disciplines them",
+    )

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
+from math import inf
 from typing import NamedTuple
 
-from outrider.scenarios.faults import ClockFault, FaultPart
+from outrider.scenarios.faults import FaultPart, FromStart
 from outrider.scenarios.links import PartitionPart
 
 
@@ -34,8 +35,8 @@ def overlaps(faults: Sequence[FaultPart], partitions: Sequence[PartitionPart]) -
     periods = []
     for index, fault in enumerate(faults):
         name, what = f"faults[{index}]", _Cause(fault.kind, (fault.vehicle,))
-        if isinstance(fault, ClockFault):
-            periods.append(_Period(name, what, 0.0, float("inf")))
+        if isinstance(fault, FromStart):
+            periods.append(_Period(name, what, 0.0, inf))
         elif (lasts := getattr(fault, "for_s", None)) is not None:
             periods.append(_Period(name, what, fault.at_s, fault.at_s + lasts))
     for index, cut in enumerate(partitions):
@@ -44,7 +45,7 @@ def overlaps(faults: Sequence[FaultPart], partitions: Sequence[PartitionPart]) -
     for one, other in combinations(periods, 2):
         if one.what == other.what and max(one.begin, other.begin) < min(one.end, other.end):
             systems = ", ".join(map(str, one.what.systems))
-            allowed = "one for each vehicle" if one.what.kind == "clock" else "one after the other"
+            allowed = "one for each vehicle" if one.end == inf else "one after the other"
             yield (
                 f"{one.name} and {other.name}: {one.what.kind} of {systems} twice at one time; "
                 f"allowed: {allowed}"

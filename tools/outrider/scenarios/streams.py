@@ -25,6 +25,7 @@ class Stream(IntEnum):
     SCENE_GOALS = 7
     SCENE_COUNTS = 8
     SCENE_TROUBLE = 9
+    SYSTEM_CLOCKS = 10
 
 
 def stream(seed: int, of: Stream, number: int = 0) -> np.random.Generator:

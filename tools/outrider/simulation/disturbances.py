@@ -6,12 +6,14 @@ from math import sqrt
 from typing import NamedTuple, Protocol
 
 from outrider.scenarios.faults import (
-    ClockFault,
+    ClockStep,
     Freeze,
+    FromStart,
     GpsJump,
     GpsLoss,
     MotorFailure,
     Sudden,
+    UtcStep,
     Vanish,
 )
 from outrider.scenarios.links import PartitionPart
@@ -42,6 +44,10 @@ class Computers(Protocol):
         """Remove the companion of ``system`` for good."""
         ...
 
+    def step_clock(self, system: int, by: int) -> None:
+        """Let the system clock of the companion of ``system`` step by ``by`` (µs)."""
+        ...
+
     def cut(self, systems: tuple[int, ...]) -> None:
         """Block the swarm link between these systems and the others."""
         ...
@@ -54,8 +60,7 @@ class Computers(Protocol):
 def events(scenario: Scenario) -> list[Event]:
     """Return all events of a scenario, sorted by time; of simultaneous events the ends come first."""
     found = []
-    # A clock fault holds from the start, so it is no event.
-    sudden = [fault for fault in scenario.faults if not isinstance(fault, ClockFault)]
+    sudden = [fault for fault in scenario.faults if not isinstance(fault, FromStart)]
     for what in (*sudden, *scenario.partitions):
         begin = round(1e6 * what.at_s)
         found.append(Event(begin, what, False))
@@ -78,6 +83,8 @@ def strike_autopilot(event: Event, autopilot: Autopilot) -> None:
         case MotorFailure(rotor=rotor, left=left):
             # ``left`` is the share of thrust; ``fail_rotor`` takes the share of speed; thrust ~ speed².
             autopilot.fail_rotor(rotor, sqrt(left))
+        case UtcStep(step_ms=step):
+            autopilot.shift_utc(round(1000.0 * step))
         case _:
             pass
 
@@ -92,6 +99,8 @@ def strike_computer(event: Event, computers: Computers) -> None:
                 computers.freeze(system)
         case Vanish(vehicle=system):
             computers.vanish(system)
+        case ClockStep(vehicle=system, step_ms=step):
+            computers.step_clock(system, round(1000.0 * step))
         case PartitionPart(members=systems):
             if event.over:
                 computers.heal(systems)

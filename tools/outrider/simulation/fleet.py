@@ -13,6 +13,7 @@ import numpy as np
 
 from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
+from companion.fleet_time_backup import FleetTimeBackup
 from companion.node import Companion
 from companion.values.bearings import bearing
 from mavlink_bridge.clocks.node_clock import NodeClock
@@ -20,7 +21,7 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.network.simulated import Channel, Faults
 from outrider.runs import names
 from outrider.scenarios.companion_settings import settings_of
-from outrider.scenarios.faults import ClockFault
+from outrider.scenarios.faults import AutopilotClockFault, ClockFault
 from outrider.scenarios.links import Links
 from outrider.scenarios.scenario import FixedTarget, PathTarget, Scenario
 from outrider.scenarios.starts import starts
@@ -28,6 +29,7 @@ from outrider.scenarios.streams import Stream, stream
 from outrider.simulation.bystander import Bystander
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.operator import Operator
+from outrider.simulation.system_clocks import EmulatedSystemClock
 from outrider.simulation.targets import Recorded, StandingTarget, Target, Walking
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
@@ -106,11 +108,21 @@ class Fleet:
         """Return the operator's node."""
         return Operator(self.frame)
 
-    def companion(self, k: int, stopwatch: Callable[[], int]) -> Companion:
-        """Return the companion of vehicle ``k``; ``stopwatch`` (ns) measures its planning."""
+    def companion(self, k: int, stopwatch: Callable[[], int], since: int) -> Companion:
+        """Return the companion of vehicle ``k``; ``stopwatch`` (ns) measures its planning.
+
+        ``since`` (µs): true time from which on its clock is that of ``clock``.
+        """
         kind = Companion if k < self.scenario.vehicles else Bystander
         config = self.companion_config_of(k)
-        return kind(config, self.systems[k], self.target_system, self.frame, stopwatch)
+        return kind(
+            config,
+            self.systems[k],
+            self.target_system,
+            self.frame,
+            stopwatch,
+            system_clock=self.system_clock(k, since),
+        )
 
     @property
     def with_backup(self) -> list[int]:
@@ -118,9 +130,12 @@ class Fleet:
         certified = self.scenario.companion.avoidance == "certified"
         return list(range(self.scenario.vehicles)) if certified else []
 
-    def backup_of(self, k: int) -> BackupNode:
+    def backup_of(self, k: int) -> BackupNode | FleetTimeBackup:
         """Return the backup node of vehicle ``k``."""
-        return BackupNode(self.companion_config_of(k), self.systems[k], self.frame)
+        config, system = self.companion_config_of(k), self.systems[k]
+        if config.certified.fleet_time == "own":
+            return BackupNode(config, system, self.frame)
+        return FleetTimeBackup(system, lambda: BackupNode(config, system, self.frame))
 
     def autopilot(self, k: int) -> Autopilot:
         """Return the autopilot with vehicle ``k``, on the ground below its start or hovering there."""
@@ -128,6 +143,7 @@ class Fleet:
         place = start * (1.0, 1.0, 0.0)
         latitude, longitude, altitude = self.frame.to_geodetic(place)
         facing = 0.0 if self._facing is None else bearing(place, self._facing)
+        clock = self._autopilot_clock(k)
         config = AutopilotConfig(
             system_id=self.systems[k],
             flavour=self.scenario.flavour_of(k),
@@ -138,9 +154,20 @@ class Fleet:
             sensors=self.scenario.sensors,
             physics=self.scenario.physics,
             **self.scenario.autopilot.model_dump(),
+            epoch_from_steps=clock.utc and self.companion_config.certified.fleet_time == "measured",
+            utc_error_us=round(1000.0 * clock.utc_error_ms),
+            clock_drift_ppm=clock.drift_ppm,
             start_height=float(start[2]) if self.scenario.airborne else 0.0,
         )
         return Autopilot(config, self.vehicle, self.frame, self.seed, weather=self.scenario.weather)
+
+    def _autopilot_clock(self, k: int) -> AutopilotClockFault:
+        """Return the errors of the clock of autopilot ``k``: none without such a fault."""
+        system = self.systems[k]
+        for fault in self.scenario.faults:
+            if isinstance(fault, AutopilotClockFault) and fault.vehicle == system:
+                return fault
+        return AutopilotClockFault(kind="autopilot_clock", vehicle=system)
 
     def clock(self, k: int, since: int) -> NodeClock:
         """Return the clock of companion ``k`` relative to true time from ``since`` (µs) on."""
@@ -150,6 +177,14 @@ class Fleet:
         bounds = self.scenario.clocks
         offset, drift = stream(self.seed, Stream.CLOCKS, k).uniform(-1.0, 1.0, 2)
         return NodeClock(round(1000.0 * bounds.offset_ms * offset), float(bounds.drift_ppm * drift), since)
+
+    def system_clock(self, k: int, since: int) -> EmulatedSystemClock | None:
+        """Return the system clock of companion ``k``; None if nobody disciplines it."""
+        bound = self.scenario.clocks.system_us
+        if bound is None:
+            return None
+        error = stream(self.seed, Stream.SYSTEM_CLOCKS, k).uniform(-1.0, 1.0)
+        return EmulatedSystemClock(self.clock(k, since), round(bound * error), bound)
 
     def phases(self) -> list[int]:
         """Return the phase (µs) of each companion in its period.

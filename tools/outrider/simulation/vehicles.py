@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
+from companion.node import Companion
 from companion.planning.avoidance import Tally
 from companion.values.phase import Phase
 from mavlink_bridge.loops.garbage import seldom_collected
@@ -24,6 +25,7 @@ from outrider.scene.companion_snapshot import CompanionSnapshot, companion_snaps
 from outrider.scene.view_commands import LOSSY, ViewCommands
 from outrider.simulation.disturbances import Event, events, strike_autopilot, strike_computer
 from outrider.simulation.fleet import Fleet
+from outrider.simulation.system_clocks import step_clock
 from outrider.simulation.truth_observer import MotionObserver, Motions
 
 EPOCH = 1_767_225_600_000_000
@@ -95,7 +97,7 @@ class Vehicles:
         self.indices = share.vehicles(scenario.size)
         self.systems = [fleet.systems[k] for k in self.indices]
         self.autopilots = [fleet.autopilot(k) for k in self.indices]
-        self.companions = [fleet.companion(k, stopwatch) for k in self.indices]
+        self.companions = [fleet.companion(k, stopwatch, EPOCH) for k in self.indices]
         self.backup_nodes = {k: fleet.backup_of(k) for k in self.indices if k in fleet.with_backup}
         nodes: list[Node] = [*self.autopilots, *self.companions, *self.backup_nodes.values()]
         own = {node.name for node in nodes}
@@ -137,7 +139,8 @@ class Vehicles:
                 taps,
                 elsewhere=elsewhere,
             )
-            computers = _Computers(loop, self.network)
+            by_system = dict(zip(self.systems, self.companions, strict=True))
+            computers = _Computers(loop, self.network, by_system)
 
             def watched(now: int) -> bool | None:
                 self._strike_due(now, computers)
@@ -238,8 +241,8 @@ class Vehicles:
 class _Computers:
     """The companions' computers in lock-step."""
 
-    def __init__(self, loop: LockStep, network: NetworkPart) -> None:
-        self._loop, self._network = loop, network
+    def __init__(self, loop: LockStep, network: NetworkPart, companions: Mapping[int, Companion]) -> None:
+        self._loop, self._network, self._companions = loop, network, companions
 
     def freeze(self, system: int) -> None:
         self._loop.freeze(names.companion(system))
@@ -249,6 +252,10 @@ class _Computers:
 
     def vanish(self, system: int) -> None:
         self._loop.vanish(names.companion(system))
+
+    def step_clock(self, system: int, by: int) -> None:
+        if system in self._companions:
+            step_clock(self._companions[system], by)
 
     def cut(self, systems: tuple[int, ...]) -> None:
         self._network.cut("swarm", map(names.companion, systems))
