@@ -64,8 +64,11 @@ class Agreements:
             self.refused += 1
             return
         peer = self._known(system)
+        departed = peer.left is not None
         if peer.receive_plan(now, plan):
             peer.last_payload = payload
+            if departed and peer.left is None:
+                self._members = None
         else:
             self.refused += 1
 

@@ -20,6 +20,9 @@ _MOST_KEPT = 5
 _OVERDUE = 0.5
 """Round trips after which an unanswered proposal is followed by another."""
 
+_LATE_US = 2_000_000
+"""Age (µs) from which on a plan of an offer that has not been received is not expected any more."""
+
 Keeps = Callable[[Array, Array, Array], bool]
 """Whether the newest own plan keeps the own side of the planes of a pair of plans, the own and the other.
 
@@ -48,10 +51,14 @@ class Negotiation:
         pair, epoch = peer.pair, newest.plan.epoch
         refused = None
         for one in pair.offers:
-            plans = self.plans_of(peer, one)
-            if one.epoch > epoch or one.own < since or plans is None or not pair.may_take(one):
+            if one.epoch > epoch or one.own < since or not pair.may_take(one):
                 continue
-            if self._kept(newest, plans, newest):
+            plans = self.plans_of(peer, one)
+            if plans is None:
+                if epoch - min(one) > _LATE_US:
+                    refused = refused or one
+                continue
+            if self._taken_in_time(newest, one, plans):
                 pair.take(one)
                 peer.changed = True
                 break
@@ -94,6 +101,18 @@ class Negotiation:
             return False
         return self._apart(peer, plans)
 
+    def _taken_in_time(self, newest: StoredPlan, one: Agreement, plans: AgreedPlans) -> bool:
+        """Return whether the ``newest`` own plan, and the one that is flown until it begins, keep ``one``.
+
+        The peer may replan on this agreement alone, and by a clock that is behind.
+        """
+        epoch = newest.plan.epoch
+        if not self._kept(newest, plans, epoch):
+            return False
+        flown = self._plans.before(epoch - 1)
+        begins = epoch if flown is None else max(flown.plan.epoch, one.epoch)
+        return flown is None or begins >= epoch or self._kept(flown, plans, begins)
+
     def _apart(self, peer: Peer, plans: AgreedPlans) -> bool:
         """Return whether the newest plans of both are as far apart as the confirmed agreement demands.
 
@@ -105,7 +124,7 @@ class Negotiation:
             return True
         before = self.plans_of(peer, confirmed)
         return before is not None and self._kept(
-            plans.other, AgreedPlans(before.other, before.own), plans.own
+            plans.other, AgreedPlans(before.other, before.own), plans.own.plan.epoch
         )
 
     def _same(self, before: AgreedPlans, after: AgreedPlans) -> bool:
@@ -116,11 +135,11 @@ class Negotiation:
             for one, two in zip(before, after, strict=True)
         )
 
-    def _kept(self, plan: StoredPlan, plans: AgreedPlans, newest: StoredPlan) -> bool:
-        """Return whether ``plan`` keeps the planes of an agreement from the begin of ``newest`` on, for ever.
+    def _kept(self, plan: StoredPlan, plans: AgreedPlans, epoch: int) -> bool:
+        """Return whether ``plan`` keeps the planes of an agreement from ``epoch`` (µs) on, for ever.
 
-        ``plans``: first that of the vehicle of ``plan``. No plan begins later than ``newest``, so all rest in
-        the last of the n + 1 segments.
+        ``plans``: first that of the vehicle of ``plan``. None of the plans begins later than ``epoch``, so
+        all rest in the last of the n + 1 segments.
         """
-        epoch, rows = newest.plan.epoch, self._steps + 1
+        rows = self._steps + 1
         return self._keeps(*(one.later(epoch, rows) for one in (plan, *plans)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from companion.avoidance.certified.committed import carried_on
 from companion.avoidance.certified.pair import Agreement, Pair
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan
 from mavlink_bridge.wire.agreements import Entry, Statement
@@ -53,16 +54,25 @@ class Peer:
         """
         if self.plans.add(plan, (one.other for one in self.pair.referenced())):
             self.last_received = now
+            self._end_departure(plan)
             return True
         self._conflict = now
         self.void()
         return False
 
+    def _end_departure(self, plan: StoredPlan) -> None:
+        """Take the peer for back if ``plan`` is later than its last plan, and not that plan carried on."""
+        if self.left is None or plan.plan.epoch <= self.left.plan.epoch:
+            return
+        last = self.left.plan
+        if carried_on(last, (plan.plan.epoch - last.epoch) // last.dt) != plan.plan:
+            self.left = None
+
     def receive(self, now: int, statement: Statement) -> bool:
         """Receive a statement of the peer; return whether names, farewell or return have changed.
 
         A farewell means that the peer's plan of that epoch is its last. It is accepted with this plan, and if
-        no newer plan is known; it is repeated for receivers that do not hold the plan yet.
+        no newer plan is known, once this plan has begun. It is repeated for receivers without this plan.
         """
         known = self.pair.kept, self.pair.considered
         if self.left is None and self._seen.get(statement) == known:
@@ -80,7 +90,7 @@ class Peer:
                 self.left, changed = None, True
         self.last_received = now
         if statement.farewell:
-            return self._part(statement.epoch) or changed
+            return (statement.epoch <= now and self._part(statement.epoch)) or changed
         for entry in statement.entries:
             if entry.peer == self._own:
                 self.changed |= self.pair.receive(statement.epoch, statement.since, entry)

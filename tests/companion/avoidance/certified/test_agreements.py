@@ -403,13 +403,52 @@ def test_a_farewell_that_comes_after_a_later_plan_is_not_accepted() -> None:
 
 def test_what_was_stated_before_a_farewell_and_comes_late_changes_nothing() -> None:
     one = agreements(OWN, OWN, OTHER)
-    one.receive_plan(NOW, OTHER, pack(plan(1)))
-    one.receive_statement(NOW, OTHER, leaving(1))
-    one.receive_plan(NOW, OTHER, pack(plan()))
+    one.receive_plan(NOW + LENGTH, OTHER, pack(plan(1)))
+    one.receive_statement(NOW + LENGTH, OTHER, leaving(1))
+    one.receive_plan(NOW + LENGTH, OTHER, pack(plan()))
     for number in (0, 1):
-        one.receive_statement(NOW, OTHER, statement(number, Entry(OWN, ((EPOCH, EPOCH),), (EPOCH, EPOCH))))
+        one.receive_statement(
+            NOW + LENGTH, OTHER, statement(number, Entry(OWN, ((EPOCH, EPOCH),), (EPOCH, EPOCH)))
+        )
     assert one.left[OTHER].plan == plan(1)
     assert not one.members
+
+
+def test_a_farewell_counts_only_once_its_plan_has_begun() -> None:
+    """By a clock that is ahead it comes earlier; constraints are made from plans that have begun."""
+    one = agreements(OWN, OWN, OTHER)
+    one.receive_plan(NOW, OTHER, pack(plan(2)))
+    one.receive_statement(NOW, OTHER, leaving(2))
+    assert one.members == {OTHER}
+    one.receive_statement(epoch(2), OTHER, leaving(2))
+    assert one.left[OTHER].plan == plan(2)
+
+
+def test_a_later_plan_ends_a_departure_unless_it_is_the_last_plan_carried_on() -> None:
+    """The statement with it may be lost."""
+    one = agreements(OWN, OWN, OTHER)
+    last = plan(0, x=4.0, speed=1.0)
+    one.receive_plan(NOW, OTHER, pack(last))
+    one.receive_statement(NOW, OTHER, leaving(0))
+    one.receive_plan(epoch(1), OTHER, pack(carried_on(last, LENGTH // DT)))
+    assert not one.members
+    one.receive_plan(epoch(2), OTHER, pack(plan(2, x=3.0)))
+    assert one.members == one.missing() == {OTHER}
+    assert not one.left
+
+
+def test_an_offer_on_a_plan_that_can_no_longer_arrive_is_refused() -> None:
+    """Its sender is free for another one; before 2 s the plan may still come."""
+    for number in (9, 12):
+        two = agreed()
+        two.make(OWN, plan(number))
+        offered = (epoch(1), EPOCH)
+        peer = Entry(OWN, ((EPOCH, EPOCH), offered), offered)
+        now = NOW + number * LENGTH
+        two.first.receive_statement(now, OTHER, statement(number, peer))
+        two.first.update(now)
+        (entry,) = two.first.entries(every=True)
+        assert (entry.considered == (EPOCH, epoch(1))) == (number == 12)
 
 
 def test_who_comes_back_is_a_member_again_and_needs_an_agreement() -> None:
