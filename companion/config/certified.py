@@ -27,6 +27,17 @@ class DeadlockConfig(Settings):
     pushed: float = Field(0.2, ge=0.0, lt=1.0, description="share of the pull from which it counts as pushed")
 
 
+class FollowingConfig(Settings):
+    """Cost of a plan whose destination moves; all other weights are those of a destination at rest."""
+
+    speed: Positive = Field(0.05, description="m/s of the destination from which it is followed")
+    omega_place: Positive = Field(40.0, description="weight of where the plan is after its first step")
+    decay: float = Field(3.0, ge=0.0, le=20.0, description="1/s by which this weight decreases from then on")
+    omega_end: Weight = Field(1.0, description="additional weight of where the plan comes to rest")
+    omega_speed: Weight = Field(1.0, description="weight of its speeds relative to the destination's")
+    omega_jerk: Weight = Field(1.0, description="weight of the change of a from step to step")
+
+
 class TimeSourcesConfig(Settings):
     """Sources of fleet time, where it is measured."""
 
@@ -122,6 +133,7 @@ class CertifiedConfig(Settings):
     omega_field: Weight = Field(0.3, description="weight of the field of those that share no plan")
     omega_jerk: Weight = Field(0.3, description="weight of the change of a from step to step")
     spare: Positive = Field(0.01, description="m wanted beyond the least distance, for rounding")
+    following: FollowingConfig = FollowingConfig()
     deadlock: DeadlockConfig = DeadlockConfig()
 
     @property

@@ -12,6 +12,7 @@ from companion.config import CompanionConfig
 from companion.config.formation import Spread
 from companion.config.planning import LimitsConfig
 from companion.estimation.tracks import State
+from companion.estimation.turn_rate import Path
 from companion.goals.formation import even_turn, outside, spacing, taking_part
 from companion.goals.settling import Settling
 from companion.values.bearings import turned
@@ -171,16 +172,25 @@ class Goals:
     def _around(self, target: State, measured: Motion, neighbours: Array) -> Aim:
         """Return the aim on the surface around the target's position at the end of the horizon."""
         ahead, rate, surface = self._lookahead_s, self._config.turn_rate, self._surface
-        (end,), (velocity,) = target.ahead(np.array([ahead]))
         here = measured.position - target.position
         turn, apart = self._turn(here, neighbours - target.position)
-        offset = surface.nearest(turned(here, turn) if turn else here)
-        if rate:
-            offset = surface.nearest(turned(offset, rate * ahead))
-            velocity = velocity + rate * np.array([-offset[1], offset[0], 0.0])
-        if turn:
-            offset = outside(offset, turn)
-        return Aim(end + offset, velocity, target.position, end, surface, apart)
+        first = surface.nearest(turned(here, turn) if turn else here)
+
+        def path(seconds: Array) -> Path:
+            """Return the destination and its velocity after ``seconds`` (n,)."""
+            positions, velocities = target.ahead(seconds)
+            offsets = np.broadcast_to(first, positions.shape)
+            if rate:
+                offsets = surface.nearest(np.array([turned(first, rate * after) for after in seconds]))
+                across = np.stack([-offsets[:, 1], offsets[:, 0], np.zeros(len(seconds))], axis=1)
+                velocities = velocities + rate * across
+            if turn:
+                offsets = np.array([outside(offset, turn) for offset in offsets])
+            return Path(positions + offsets, velocities)
+
+        (destination,), (velocity,) = path(np.array([ahead]))
+        (end,), _ = target.ahead(np.array([ahead]))
+        return Aim(destination, velocity, target.position, end, surface, apart, path)
 
     def _turn(self, offset: Array, neighbours: Array) -> tuple[float, float]:
         """Return the angle (rad) by which to go round, and the spacing.

@@ -133,7 +133,10 @@ class Commitment:
             kept = along(corridor.normals, points) - corridor.least
             if kept.min(initial=np.inf) >= 0.0:
                 push = np.einsum("mni,mnk->k", answer.plane_multipliers, corridor.normals)
-                self._deadlock_turn.learn(points[-1, 2], goal, push, 1e-6 * self._config.epoch_us)
+                moving = objective.moving
+                gradient = self._program.costs[moving].gradient_per_metre
+                seconds = 1e-6 * self._config.epoch_us
+                self._deadlock_turn.learn(points[-1, 2], goal, push, gradient, seconds, moving=moving)
                 self.following = plan
                 return True
         self.carry_on(HoldReason.UNSOLVED)

@@ -32,11 +32,11 @@ _REACHED_M = 0.1
 class DeadlockTurn:
     """Turn of one vehicle's goal.
 
-    ``gradient_per_metre``: gradient of the cost per metre of error. ``sense``: +1 turns right.
+    ``sense``: +1 turns right.
     """
 
-    def __init__(self, config: DeadlockConfig, gradient_per_metre: float, sense: float = 1.0) -> None:
-        self._config, self._gradient_per_metre, self._sense = config, gradient_per_metre, sense
+    def __init__(self, config: DeadlockConfig, sense: float = 1.0) -> None:
+        self._config, self._sense = config, sense
         self.angle = 0.0
         """Angle (rad) by which the goal is turned now, to the side of ``sense``."""
         self._distance: float | None = None
@@ -54,11 +54,22 @@ class DeadlockTurn:
             offset = offset * (self._config.detour / length)
         return position + turned(offset, -self._sense * self.angle)
 
-    def learn(self, rest: Array, goal: Array, push: Array, seconds: float) -> None:
+    def learn(
+        self,
+        rest: Array,
+        goal: Array,
+        push: Array,
+        gradient_per_metre: float,
+        seconds: float,
+        *,
+        moving: bool = False,
+    ) -> None:
         """Update the turn from the plan just made.
 
-        The plan ends at rest at ``rest`` (3,), m. ``push`` (3,) is the force F of its planes. The previous
-        plan was made ``seconds`` ago.
+        The plan ends at rest at ``rest`` (3,), m. ``push`` (3,) is the force F of its planes,
+        ``gradient_per_metre`` the gradient of its cost per metre of error. The previous plan was made
+        ``seconds`` ago. ``moving``: the goal moves; the distance from it then does not measure progress, and
+        the turn stays below ``bend``.
         """
         config = self._config
         offset = goal - rest
@@ -66,7 +77,9 @@ class DeadlockTurn:
         direction = offset / max(distance, 1e-6)
         approach_speed = np.inf if self._distance is None else (self._distance - distance) / seconds
         self._distance = distance
-        if distance < self._best - _MIN_GAIN_M or distance < _REACHED_M:
+        if moving:
+            self._best, self._waited = np.inf, 0.0
+        elif distance < self._best - _MIN_GAIN_M or distance < _REACHED_M:
             self._best, self._waited = min(distance, self._best), 0.0
         else:
             self._waited += seconds
@@ -75,9 +88,7 @@ class DeadlockTurn:
         if overtime > 0.0:
             # After ``patience`` without progress, a push back along the turned direction counts, too.
             push_back = max(push_back, -float(push @ turned(direction, -self._sense * self.angle)))
-        pushed = min(
-            max(push_back / (self._gradient_per_metre * max(distance, _MIN_PULL_DISTANCE_M)), 0.0), 1.0
-        )
+        pushed = min(max(push_back / (gradient_per_metre * max(distance, _MIN_PULL_DISTANCE_M)), 0.0), 1.0)
         pushed *= min(max(1.0 - approach_speed / config.speed, 0.0), 1.0)
         if pushed > config.pushed:
             most = min(config.bend_more, config.bend + config.slow * overtime)

@@ -36,9 +36,7 @@ class CertifiedFlight:
         program = SeparationQp(
             steps, config.limits.within(config.field.margin(1)), certified, planar=config.planar
         )
-        self._deadlock_turn = DeadlockTurn(
-            certified.deadlock, program.gradient_per_metre, _TURNING_SENSES.get(config.turning_sense, 1.0)
-        )
+        self._deadlock_turn = DeadlockTurn(certified.deadlock, _TURNING_SENSES.get(config.turning_sense, 1.0))
         self.commitment = Commitment(
             certified, program, self._deadlock_turn, fleet.fingerprint, planar=config.planar
         )
@@ -53,8 +51,7 @@ class CertifiedFlight:
         )
         self.clocks = ClockWatch(own, certified.clock_us)
         self._replies: list[Timesync] = []
-        seconds = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
-        self._before_end: Array = seconds - seconds[-1]
+        self._seconds: Array = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
         self._steps = steps
         self.deviation = self.largest_deviation = 0.0
         """Distance (m) of the vehicle from its plan: ``deviation`` now, ``largest_deviation`` at most."""
@@ -64,7 +61,7 @@ class CertifiedFlight:
         self._turn = 0
         self._polled_at: int | None = None
         self._next_announcement = 0
-        self.lookahead_s = float(seconds[-1]) + 1e-6 * certified.epoch_us
+        self.lookahead_s = float(self._seconds[-1]) + 1e-6 * certified.epoch_us
         """Time (s) from now to the end of the plan that is made next, at most."""
 
     def receive(self, now: int, message: Tunnel | Timesync) -> None:
@@ -171,9 +168,21 @@ class CertifiedFlight:
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
         goal = self._deadlock_turn.turned(start.position_m, aim.destination)
-        places = goal + self._before_end[:, None] * aim.velocity
-        objective = Objective(places, np.broadcast_to(aim.velocity, places.shape), field)
+        objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, aim.destination, others)
+
+    def _objective(self, begins: float, aim: Aim, goal: Array, field: Array) -> Objective:
+        """Return the preferred places of a plan that begins in ``begins`` s and should end at ``goal`` (3,).
+
+        Those of a destination that moves are on its path, all shifted by the offset of ``goal`` from its end.
+        """
+        if aim.path is None:
+            places = np.broadcast_to(goal, field.shape)
+            return Objective(places, np.zeros(field.shape), field)
+        positions, velocities = aim.path(begins + self._seconds)
+        (end,), _ = aim.path(np.array([self.lookahead_s]))
+        moving = float(aim.velocity @ aim.velocity) > self._config.certified.following.speed**2
+        return Objective(positions + (goal - end), velocities, field, moving)
 
     def idle(self, now: int) -> bool:
         """Return whether there is nothing to make or to announce until something else is due."""

@@ -1,9 +1,9 @@
 """QP of the certified mode: three axes together, because planes couple them; PIQP, with the rows that matter.
 
 Variables are the accelerations of each axis in turn, n for each. The paper's cost weights the last step alone
-and adds the field to the acceleration. Here every step is weighted, and the field f enters as the linear term
-−2 Ω_f f·x of every step: it moves the positions within the constraints. A plan that ends at rest could not
-follow a lasting push with its accelerations. The plan ends at rest.
+and adds the field to the acceleration. Here every step is weighted (``cost``), and the field f enters as the
+linear term −2 Ω_f f·x of every step: it moves the positions within the constraints. A plan that ends at rest
+could not follow a lasting push with its accelerations. The plan ends at rest.
 
 Bounds of acceleration are bounds on variables. Limits of speed and position and the planes are rows Ga ≥ low.
 ``active_set`` finds what binds, about ten of seven hundred. PIQP solves the QP with that in its dual form:
@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.avoidance.certified.cost import arriving, following
 from companion.avoidance.certified.qp_vectors import row_bounds, write_cost, write_start
 from companion.avoidance.certified.rows import (
     active_set,
@@ -70,12 +71,14 @@ class State(NamedTuple):
 class Objective(NamedTuple):
     """Preferred places (n, 3), m, and velocities (n, 3), m/s, after each step.
 
-    ``field``: the field f (n, 3), m/s², that the plan yields to.
+    ``field``: the field f (n, 3), m/s², that the plan yields to. ``moving``: whether the places are those of
+    a destination that moves, which the plan follows.
     """
 
     places: Array
     velocities: Array
     field: Array
+    moving: bool = False
 
 
 class Answer(NamedTuple):
@@ -106,30 +109,19 @@ class SeparationQp:
         v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self.S_v, self._S_x))
         # ``maps[b] @ a``: what the accelerations a add to control point b of each segment, (3, n, n).
         self.maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x])
-        self._weights = np.full(n, config.omega_place)
-        self._weights[-1] = config.omega_end
-        # ``change @ a``: a_k − a_{k−1}; for k = 0, ``_cost`` subtracts the acceleration flown until then.
-        change = np.eye(n) - np.eye(n, k=-1)
-        one = 2.0 * (
-            self._S_x.T @ (self._weights[:, None] * self._S_x)
-            + config.omega_speed * self.S_v.T @ self.S_v
-            + config.omega_input * np.eye(n)
-            + config.omega_jerk * change.T @ change
-        )
-        self._P = np.asfortranarray(np.kron(np.eye(3), one))
+        self.costs = {
+            moving: cost(config, self._S_x, self.S_v)
+            for moving, cost in ((False, arriving), (True, following))
+        }
+        self._P = {
+            moving: np.asfortranarray(np.kron(np.eye(3), cost.P)) for moving, cost in self.costs.items()
+        }
         self._A = np.asfortranarray(np.kron(np.eye(3), self.S_v[-1:]))
-        # Inverse of the optimality conditions of an axis without rows and bounds: from −c, and from −v.
-        conditions = np.block([[one, self.S_v[-1:].T], [self.S_v[-1:], np.zeros((1, 1))]])
-        inverse = np.linalg.inv(conditions)
-        self._inverse: Array = np.ascontiguousarray(inverse[:n, :n])
-        self._stopping: Array = np.ascontiguousarray(inverse[:n, n])
         # Memory of ``active_set``.
         most = _MOST_BINDING
         self._active = np.zeros(most, np.int64)
         self._images, self._gram = np.zeros((most, 3, n)), np.zeros((most, most))
         self._missing = np.zeros(most)
-        self.gradient_per_metre = 2.0 * float(self._weights.sum())
-        """Derivative of the cost by a shift of the whole plan, one metre from all its preferred places."""
         a_max = np.array(limits.u_max) - _ROUNDED
         if planar:
             # The heights stay almost constant: an interior-point method needs an interior.
@@ -148,10 +140,9 @@ class SeparationQp:
         Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs or although
         the QP holds them.
         """
-        config, n = self._config, self.n
+        n, cost = self.n, self.costs[objective.moving]
         c, start = np.empty((3, n)), np.empty((3, n))
-        weights = config.omega_speed, config.omega_field, config.omega_jerk
-        places, velocities, field = map(np.ascontiguousarray, objective)
+        places, velocities, field = map(np.ascontiguousarray, objective[:3])
         write_cost(
             state.position,
             state.velocity,
@@ -159,14 +150,16 @@ class SeparationQp:
             places,
             velocities,
             field,
-            self._weights,
-            *weights,
+            cost.places,
+            cost.fields,
+            cost.omega_speed,
+            cost.omega_jerk,
             self._S_x,
             self.S_v,
             self.dt,
             c,
         )
-        write_start(c, state.velocity, self._inverse, self._stopping, start)
+        write_start(c, state.velocity, cost.inverse, cost.stopping, start)
         flown = np.ascontiguousarray(state.committed.T)
         low = np.empty(_KINDS * n + planes.normals.size)
         row_bounds(
@@ -175,13 +168,13 @@ class SeparationQp:
         # The planes are made so that the committed plan keeps them.
         relax_limits(flown, self.dt, low)
         bounds = np.minimum(-self._a_max, flown), np.maximum(self._a_max, flown)
-        problem = _Problem(c, start, flown, state.velocity, planes.normals, low, *bounds)
+        problem = _Problem(objective.moving, c, start, flown, state.velocity, planes.normals, low, *bounds)
         return self._by_active_set(problem) or self._by_rows(problem)
 
     def _by_active_set(self, problem: _Problem) -> Answer | None:
         """Return the solution of what binds; None if there is none, or if it violates a row or bound."""
         count = active_set(
-            self._inverse,
+            self.costs[problem.moving].inverse,
             problem.start,
             self.dt,
             self.S_v,
@@ -241,7 +234,9 @@ class SeparationQp:
             G = np.empty((len(chosen), 3, self.n))
             write_rows(chosen, self.S_v, self.maps, problem.normals, G)
             rows = G.reshape(len(chosen), 3 * self.n), problem.low[chosen]
-            found = solve_once(self._P, problem.c.ravel(), self._A, -problem.velocity, *rows, a_min, a_max)
+            found = solve_once(
+                self._P[problem.moving], problem.c.ravel(), self._A, -problem.velocity, *rows, a_min, a_max
+            )
             a: Array = found.x.reshape(3, self.n)
             broken = self._slacks(problem, a) < -_TOLERANCE
             if not broken.any():
@@ -267,10 +262,12 @@ class SeparationQp:
 class _Problem(NamedTuple):
     """One problem, by axis: c, the best plan without inequalities, and the committed accelerations, (3, n).
 
-    ``velocity`` (3,); normals (M, n, 3) of the planes; ``low`` (R,) of the rows: first those of the limits,
-    then those of the planes; bounds of the accelerations, (3, n).
+    ``moving``: whether the destination moves. ``velocity`` (3,); normals (M, n, 3) of the planes; ``low``
+    (R,) of the rows: first those of the limits, then those of the planes; bounds of the accelerations,
+    (3, n).
     """
 
+    moving: bool
     c: Array
     start: Array
     flown: Array

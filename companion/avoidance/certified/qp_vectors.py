@@ -8,7 +8,9 @@ from companion.values.compiled import FLOAT, VOID, array, kernel, output
 from companion.values.horizon import Array
 
 
-@kernel(VOID, *[array(1)] * 3, *[array(2)] * 3, array(1), *[FLOAT] * 3, *[array(2)] * 2, FLOAT, output(2))
+@kernel(
+    VOID, *[array(1)] * 3, *[array(2)] * 3, *[array(1)] * 2, *[FLOAT] * 2, *[array(2)] * 2, FLOAT, output(2)
+)
 def write_cost(
     position: Array,
     velocity: Array,
@@ -17,22 +19,25 @@ def write_cost(
     velocities: Array,
     field: Array,
     weights: Array,
+    fields: Array,
     omega_speed: float,
-    omega_field: float,
     omega_jerk: float,
     S_x: Array,
     S_v: Array,
     dt: float,
     c: Array,
 ) -> None:
-    """Write c (3, n) from a ``State`` and an ``Objective``; ``weights`` (n,) are those of the places."""
+    """Write c (3, n) from a ``State`` and an ``Objective``.
+
+    ``weights`` and ``fields`` (n,) are those of the places and of the field.
+    """
     n = len(weights)
     for axis in range(3):
         for j in range(n):
             total = 0.0
             for k in range(j, n):
                 off = position[axis] + dt * (k + 1.0) * velocity[axis] - places[k, axis]
-                total += S_x[k, j] * (weights[k] * off - omega_field * field[k, axis])
+                total += S_x[k, j] * (weights[k] * off - fields[k] * field[k, axis])
                 total += omega_speed * S_v[k, j] * (velocity[axis] - velocities[k, axis])
             c[axis, j] = 2.0 * total
         c[axis, 0] -= 2.0 * omega_jerk * before[axis]

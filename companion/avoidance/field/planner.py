@@ -30,7 +30,8 @@ class Aim(NamedTuple):
 
     ``destination`` x̌ (3,) and terminal ``velocity`` (3,); ``target`` (3,) now and ``target_end`` (3,) at the
     end of the horizon. ``surface`` is the one that x̌ lies on, None for a goal. ``spacing``: distance (m)
-    that vehicles that share the surface shall keep; ∞ where it is not shared.
+    that vehicles that share the surface shall keep; ∞ where it is not shared. ``path`` gives the places and
+    velocities of a destination that moves after times (n,), s, from now; None for one at rest.
     """
 
     destination: Array
@@ -39,6 +40,7 @@ class Aim(NamedTuple):
     target_end: Array
     surface: Surface | None = None
     spacing: float = inf
+    path: Callable[[Array], tuple[Array, Array]] | None = None
 
 
 def standing(goal: Array, target: Array | None = None) -> Aim:

@@ -82,10 +82,11 @@ def jam(seed: int) -> Scene:
 
 
 def wish(rng: np.random.Generator, here: Array) -> Objective:
-    """Any place within some metres, at any speed."""
+    """Any place within some metres, at any speed; at rest or followed."""
     places = np.broadcast_to(here + rng.normal(size=3) * 10.0 ** rng.uniform(-1, 1.2), (STEPS, 3))
     velocities = np.broadcast_to(rng.uniform(-3, 3, 3) * rng.integers(0, 2), (STEPS, 3))
-    return Objective(places, velocities, rng.normal(size=(STEPS, 3)) * rng.integers(0, 2))
+    field = rng.normal(size=(STEPS, 3)) * rng.integers(0, 2)
+    return Objective(places, velocities, field, moving=bool(rng.integers(0, 2)))
 
 
 def flown(scene: Scene, accelerations: Array) -> tuple[Array, Array]:
@@ -101,15 +102,21 @@ def residuals(scene: Scene, wish: Objective, accelerations: Array) -> Array:
     """What the plan with ``accelerations`` (n, 3) costs, as the settings say it, is the sum of their
     squares."""
     points, velocities = flown(scene, accelerations)
-    weights = np.full((STEPS, 1), CONFIG.omega_place)
+    weights, settings = np.full((STEPS, 1), CONFIG.omega_place), CONFIG.following if wish.moving else CONFIG
     weights[-1] = CONFIG.omega_end
+    # −2 Ω f·x as part of the square: it is the place that is elsewhere.
+    moved = CONFIG.omega_field * wish.field / weights
+    if wish.moving:
+        seconds = 1e-6 * DT * np.arange(STEPS)[:, None]
+        weights = CONFIG.following.omega_place * np.exp(-CONFIG.following.decay * seconds)
+        weights[-1] += CONFIG.following.omega_end
+        moved = CONFIG.omega_field * wish.field / CONFIG.omega_place
     change = np.diff(accelerations, axis=0, prepend=scene.state.before[None])
     parts = (
-        # −2 Ω f·x as part of the square: it is the place that is elsewhere.
-        np.sqrt(weights) * (points[:, 2] - wish.places - CONFIG.omega_field * wish.field / weights),
-        sqrt(CONFIG.omega_speed) * (velocities - wish.velocities),
+        np.sqrt(weights) * (points[:, 2] - wish.places - moved),
+        sqrt(settings.omega_speed) * (velocities - wish.velocities),
         sqrt(CONFIG.omega_input) * accelerations,
-        sqrt(CONFIG.omega_jerk) * change,
+        sqrt(settings.omega_jerk) * change,
     )
     return np.concatenate([part.ravel() for part in parts])
 

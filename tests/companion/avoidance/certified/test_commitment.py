@@ -37,7 +37,7 @@ choices = st.lists(st.sampled_from(["plan", "hold", "wait", "sleep"]), max_size=
 
 def commitment() -> Commitment:
     program = SeparationQp(STEPS, LimitsConfig(), CONFIG)
-    kept = Commitment(CONFIG, program, DeadlockTurn(CONFIG.deadlock, program.gradient_per_metre), 7)
+    kept = Commitment(CONFIG, program, DeadlockTurn(CONFIG.deadlock), 7)
     kept.begin(EPOCH, HERE)
     return kept
 
