@@ -4,8 +4,9 @@ Primal–dual active-set method (M. Hintermüller, K. Ito and K. Kunisch, "The p
 a semismooth Newton method", 2003): with a guess of what binds, the minimiser with that held is one linear
 system; free variables beyond a bound are then fixed to it, and what is held with a multiplier of the wrong
 sign is released, all at once. Where this cycles, one variable changes at a time (K. G. Murty's rule, which
-ends). Rows join one at a time, the most violated first. The result is a guess that the caller must verify.
-Search and verification share parts, and a kernel and its parts must be in one file: that makes it long.
+ends). The first rows join together, each with a variable that keeps it; then one joins at a time, the most
+violated first. The result is a guess that the caller must verify. Search and verification share parts,
+and a kernel and its parts must be in one file: that makes it long.
 """
 
 from __future__ import annotations
@@ -162,6 +163,42 @@ def _worst(G: Array, h_l: Array, h_u: Array, x: Array) -> int:
     return worst
 
 
+@part
+def _follow_rows(
+    G: Array,
+    x_l: Array,
+    x_u: Array,
+    h_l: Array,
+    h_u: Array,
+    x: Array,
+    side: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    sides: NDArray[np.int64],
+) -> int:
+    """Hold the rows that ``x`` breaks, step by step, each by the last variable that it depends on.
+
+    G consists of triangular blocks (n, n): row r depends on the variables up to r mod n, as speed and place
+    after a step depend on the accelerations up to it. Such a variable becomes free if its bounds allow it,
+    and ``x`` changes. Returns the number of held rows.
+    """
+    n, held = len(x), 0
+    for k in range(n):
+        for r in range(k, len(G), n):
+            value = 0.0
+            for j in range(k + 1):
+                value += G[r, j] * x[j]
+            low, high = h_l[r] - _TOLERANCE, h_u[r] + _TOLERANCE
+            if low <= value <= high or G[r, k] == 0.0:
+                continue
+            new = x[k] + ((h_l[r] if value < low else h_u[r]) - value) / G[r, k]
+            if x_l[k] <= new <= x_u[k]:
+                x[k], side[k] = new, 0
+                rows[held], sides[held] = r, -1 if value < low else 1
+                held += 1
+                break
+    return held
+
+
 @kernel(
     INT,
     *[array(2)] * 8,
@@ -214,7 +251,7 @@ def working_sets(
                 start[k] += minimiser[k, j] * c[i, j]
         if not _starts(start, x_l[i], x_u[i], side, x[i]):
             continue
-        held, size, settled = 0, -1, False
+        held, size, settled, followed = 0, -1, False, False
         for step in range(_MAX_STEPS):
             size = _held_minimiser(
                 P, G, c[i], h_l[i], h_u[i], side, rows[i], sides[i], held, free[i], x[i], multipliers, L, T, S
@@ -246,6 +283,11 @@ def working_sets(
                 if worst == 0:
                     settled = True
                     break
+                if not followed:
+                    followed = True
+                    held = _follow_rows(G, x_l[i], x_u[i], h_l[i], h_u[i], x[i], side, rows[i], sides[i])
+                    if held > 0:
+                        continue
                 if held == n:
                     break
                 rows[i, held], sides[i, held] = abs(worst) - 1, 1 if worst > 0 else -1

@@ -88,6 +88,32 @@ def test_most_qps_need_no_more_than_their_working_set() -> None:
     assert whole[2 * N] < 150
 
 
+@LAWS
+@given(st.floats(0.0, 0.999), st.floats(30.0, 300.0), st.sampled_from([-1.0, 1.0]))
+def test_a_vehicle_on_its_way_to_a_distant_goal_accelerates_to_its_top_speed(
+    share: float, distance: float, sign: float
+) -> None:
+    """All variables are at their bounds without the limit of speed, so that none is free to keep it."""
+    top, most = 3.0, 2.0
+    speed = share * top
+    pull = 40.0 * (N * 0.1 * speed - distance) * S_X[-1] + 20.0 * speed * S_V[-1]
+    c = sign * np.tile(pull, (3, 1))
+    bounds, rows = np.full((3, N), most), np.full((3, 2 * N), np.inf)
+    rows[:, :N] = top - speed
+    low = np.full((3, 2 * N), -np.inf)
+    low[:, :N] = -top - speed
+    if sign < 0.0:
+        rows, low = -low, -rows
+    vectors = Vectors(c, -bounds, bounds, low, rows)
+    qp = ReducedQp(P, SPEEDS_AND_PLACES, 3)
+    guess = qp.guess(vectors, [0])
+    assert guess.missing == qp.settle(vectors, guess, [0]) == []
+    np.testing.assert_allclose(
+        guess.x[0], oracle(Drawn(qp, vectors, SPEEDS_AND_PLACES), 0), rtol=0.0, atol=1e-6
+    )
+    assert np.max(sign * (S_V @ guess.x[0])) == pytest.approx(top - speed)
+
+
 @pytest.mark.parametrize("G", [NO_ROWS, SPEEDS_AND_PLACES], ids=["bounds", "rows"])
 def test_a_wrong_working_set_is_noticed(G: Array, monkeypatch: pytest.MonkeyPatch) -> None:
     """A bound that binds is forgotten, or one that does not bind is held: the QP is solved as a whole."""
