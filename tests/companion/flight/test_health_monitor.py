@@ -14,6 +14,7 @@ from companion.flight.guard import Holding
 from companion.flight.health_monitor import HealthInputs, HealthMonitor, Reaction
 from companion.flight.vehicle import Vehicle
 from companion.values.phase import Phase
+from companion.values.refused_senders import RefusedSenders
 from companion.world import View
 from mavlink_bridge.messages import (
     CommandLong,
@@ -119,6 +120,9 @@ LIMITS = {
         TO_LAND,
     ),
     "a jump to nowhere": ("origin", {}, {"moves": 1, "displaced": math.nan}, TO_LAND),
+    "plans in another frame": ("foreign 12", {}, {"refused": RefusedSenders(foreign=(12,))}, TELL),
+    "another fleet file": ("differing 12", {}, {"refused": RefusedSenders(differing=(12,))}, TELL),
+    "two vehicles with an id": ("doubled 12", {}, {"refused": RefusedSenders(doubled=(12,))}, TELL),
     "who took it over": ("custody", {"phase": Phase.ESCORT}, {"phase": Phase.YIELDED}, TELL),
 }
 
