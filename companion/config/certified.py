@@ -11,6 +11,9 @@ from companion.values.settings import Positive, Settings, WireStep
 Weight = Annotated[float, Field(ge=0.0, le=1e4)]
 
 
+SystemId = Annotated[int, Field(ge=1, le=255)]
+
+
 class DeadlockConfig(Settings):
     """Turn of the goal to the side when a plan is pushed back and makes no progress."""
 
@@ -121,7 +124,7 @@ class CertifiedConfig(Settings):
         le=600_000_000,
         description="µs of hover at the end of a plan whose companion is gone",
     )
-    fleet: tuple[int, ...] = Field(
+    fleet: tuple[SystemId, ...] = Field(
         (), max_length=255, description="system ids that take part: no vehicle moves before all are received"
     )
     noncooperative_speed: Positive = Field(1.0, description="m/s, of those that share no plan")

@@ -225,7 +225,11 @@ class HealthMonitor:
             Concern(f"foreign {system}", f"Plans of {system} are in another frame")
             for system in s.refused.foreign
         ]
-        return doubled + foreign
+        differing = [
+            Concern(f"differing {system}", f"{system} has another fleet file or settings")
+            for system in s.refused.differing
+        ]
+        return doubled + foreign + differing
 
     def _fence(self, s: HealthInputs) -> Concern | None:
         guard, own = self._config.guard, s.view.own

@@ -8,9 +8,10 @@ from typing import NamedTuple
 class RefusedSenders(NamedTuple):
     """Senders whose plans are refused, by system id.
 
-    ``doubled``: two vehicles send plans with the id. ``foreign``: plans are in another fleet frame, or on
-    other knots.
+    ``doubled``: two vehicles send plans with the id. ``foreign``: plans are in another fleet frame.
+    ``differing``: another of the settings that a fleet has in common differs, as with another fleet file.
     """
 
     doubled: tuple[int, ...] = ()
     foreign: tuple[int, ...] = ()
+    differing: tuple[int, ...] = ()

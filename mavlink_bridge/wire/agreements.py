@@ -3,11 +3,11 @@
 An agreement of two vehicles names one plan of each, by the epochs at which these begin. Both compute the same
 separating planes from the two plans, and keep to their own sides of them.
 
-Sizes in bytes, little endian: kind 1, flags 1 (bit 0: farewell, bit 1: away), checksum of the fleet frame 4,
-epoch 7 (µs), since 7 (µs), then the entries. An entry: peer 1, flags and number 1 (bit 7: departed, bits 0–3:
-number of agreements), then the newest considered agreement and the agreements, each 7 + 7 (µs: epoch of the
-sender's plan, epoch of the peer's plan). An agreement that is considered and is the only one is written once
-(bit 6).
+Sizes in bytes, little endian: kind 1, flags 1 (bit 0: farewell, bit 1: away), fingerprint of the
+fleet's common settings 4, epoch 7 (µs), since 7 (µs), then the entries. An entry: peer 1, flags and number 1
+(bit 7: departed, bits 0–3: number of agreements), then the newest considered agreement and the agreements,
+each 7 + 7 (µs: epoch of the sender's plan, epoch of the peer's plan). An agreement that is considered and is
+the only one is written once (bit 6).
 """
 
 from __future__ import annotations
@@ -54,13 +54,14 @@ class Entry(NamedTuple):
 class Statement(NamedTuple):
     """Statement of one vehicle.
 
-    ``frame``: 32-bit checksum of the fleet frame. ``epoch`` (µs): epoch of the sender's newest plan.
-    ``since`` (µs): epoch of the first plan since which each plan began on the one before; agreements on an
-    older plan of the sender are void. ``farewell``: the plan of ``epoch`` is the sender's last. ``away``: the
-    sender's vehicle is flown by another controller, and need not keep to its plan.
+    ``fingerprint``: 32 bits of the settings that the fleet has in common. ``epoch`` (µs): epoch of the
+    sender's newest plan. ``since`` (µs): epoch of the first plan since which each plan began on the one
+    before; agreements on an older plan of the sender are void. ``farewell``: the plan of ``epoch`` is the
+    sender's last. ``away``: the sender's vehicle is flown by another controller, and need not keep to its
+    plan.
     """
 
-    frame: int
+    fingerprint: int
     epoch: int
     since: int
     entries: tuple[Entry, ...] = ()
@@ -73,7 +74,7 @@ def pack(statement: Statement) -> bytes:
     try:
         flags = (_FAREWELL if statement.farewell else 0) | (_AWAY if statement.away else 0)
         epochs = _epoch(statement.epoch), _epoch(statement.since)
-        parts = [_HEADER.pack(KIND, flags, statement.frame, *epochs)]
+        parts = [_HEADER.pack(KIND, flags, statement.fingerprint, *epochs)]
         parts += [_packed(entry) for entry in statement.entries]
     except (OverflowError, ValueError, StructError):
         raise PlanWireError(f"out of range of the wire: {statement}") from None
@@ -91,16 +92,15 @@ def unpack(data: bytes) -> Statement:
     """
     if not _HEADER.size <= len(data) <= LARGEST:
         raise PlanWireError(f"{len(data)} bytes are not a statement of agreements")
-    kind, flags, frame, epoch, since = _HEADER.unpack_from(data)
+    kind, flags, fingerprint, epoch, since = _HEADER.unpack_from(data)
     if kind != KIND or flags & ~(_FAREWELL | _AWAY):
         raise PlanWireError(f"kind {kind} with flags {flags} is not a statement of kind {KIND}")
     entries, at = [], _HEADER.size
     while at < len(data):
         entry, at = _unpacked(data, at)
         entries.append(entry)
-    return Statement(
-        frame, _read(epoch), _read(since), tuple(entries), bool(flags & _FAREWELL), bool(flags & _AWAY)
-    )
+    farewell, away = bool(flags & _FAREWELL), bool(flags & _AWAY)
+    return Statement(fingerprint, _read(epoch), _read(since), tuple(entries), farewell, away)
 
 
 def in_messages(statement: Statement) -> list[Statement]:

@@ -220,7 +220,7 @@ def test_after_a_farewell_it_is_silent() -> None:
 
 def stated(source: Source = COMPANION, *, farewell: bool = False) -> Tunnel:
     """A statement of the companion's agreements."""
-    said = Statement(FLEET.checksum, BEGIN, BEGIN, (Entry(12, ((BEGIN, BEGIN),), (BEGIN, BEGIN)),), farewell)
+    said = Statement(7, BEGIN, BEGIN, (Entry(12, ((BEGIN, BEGIN),), (BEGIN, BEGIN)),), farewell)
     return Tunnel(source, 0, 0, AGREEMENTS, pack_statement(said))
 
 

@@ -8,6 +8,7 @@ agreement before it has begun anew.
 
 from __future__ import annotations
 
+from companion.avoidance.certified.fingerprint import FleetIdentity
 from companion.avoidance.certified.negotiation import AgreedPlans, Keeps, Negotiation
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
@@ -22,23 +23,27 @@ from mavlink_bridge.wire.plan import WirePlan
 _OLDEST, _AHEAD = 12, 4
 """Largest time (epochs) by which a received plan may begin before now, and after."""
 _FOREIGN_US = 5_000_000
-"""Time (µs) after a message of a foreign fleet during which its sender is reported."""
+"""Time (µs) after a message of another fleet during which nothing of its sender is accepted."""
 
 
 class Agreements:
-    """Agreements of the vehicle ``own`` (system id) in a fleet frame with the 32-bit checksum ``frame``.
+    """Agreements of the vehicle ``own`` (system id) in a ``fleet``.
 
     ``steps``: number of knots of every plan. ``since``: epoch (µs) of the first plan since which each own
     plan began on the one before. ``refused`` counts the messages that were not accepted.
     """
 
-    def __init__(self, own: int, config: CertifiedConfig, steps: int, frame: int, keeps: Keeps) -> None:
-        self._own, self._config, self._steps, self.frame = own, config, steps, frame
+    def __init__(
+        self, own: int, config: CertifiedConfig, steps: int, fleet: FleetIdentity, keeps: Keeps
+    ) -> None:
+        self._own, self._config, self._steps, self._fleet = own, config, steps, fleet
         self._plans = PlanFile()
         self._negotiation = Negotiation(self._plans, steps, keeps)
         self._peers = {system: Peer(own, system) for system in set(config.fleet) - {own}}
         self._members: frozenset[int] | None = None
         self._foreign: dict[int, int] = {}
+        self._other_knots: dict[int, int] = {}
+        self._differing: dict[int, int] = {}
         self.since = self.refused = 0
 
     def receive_plan(self, now: int, system: int, payload: bytes) -> None:
@@ -60,7 +65,7 @@ class Agreements:
         except PlanWireError:
             self.refused += 1
             return
-        if not (at_rest and self._fits(now, system, plan.plan)):
+        if not (at_rest and self._fits(now, system, plan.plan)) or self._unknown_differs(now, system):
             self.refused += 1
             return
         peer = self._known(system)
@@ -75,27 +80,45 @@ class Agreements:
     def _fits(self, now: int, system: int, plan: WirePlan) -> bool:
         """Return whether a plan is in the fleet's frame, on its knots, and of about ``now`` (µs)."""
         epoch = self._config.epoch_us
-        if (
-            plan.origin != self.frame & 0xFF
-            or plan.dt != self._config.dt_us
-            or len(plan.accelerations) != self._steps
-            or plan.epoch % epoch
-        ):
+        if plan.origin != self._fleet.origin:
             self._foreign[system] = now
+            return False
+        if plan.dt != self._config.dt_us or len(plan.accelerations) != self._steps or plan.epoch % epoch:
+            self._other_knots[system] = now
             return False
         return -_OLDEST * epoch <= plan.epoch - now <= _AHEAD * epoch
 
     def receive_statement(self, now: int, system: int, statement: Statement) -> None:
-        """Receive a statement of ``system``; refuse one of another frame, or of a clock that is ahead."""
+        """Receive a statement of ``system``; refuse one of another fleet, or of a clock that is ahead."""
         if system == self._own:
             return
-        if statement.frame != self.frame:
-            self._foreign[system] = now
-            self.refused += 1
+        if statement.fingerprint != self.fingerprint:
+            self._refuse_fleet(now, system)
         elif statement.epoch - now > _AHEAD * self._config.epoch_us:
             self.refused += 1
         elif self._known(system).receive(now, statement):
             self._members = None
+
+    def _refuse_fleet(self, now: int, system: int) -> None:
+        """Refuse a statement of another fleet.
+
+        Its sender is no member, unless it is expected. If statements of this fleet were received from the id
+        as well, two vehicles have it, or its companion has begun again with other settings.
+        """
+        self.refused += 1
+        self._differing[system] = now
+        peer = self._peers.get(system)
+        if peer is None:
+            return
+        if peer.stated:
+            peer.contradict(now)
+        elif system not in self._config.fleet:
+            del self._peers[system]
+            self._members = None
+
+    def _unknown_differs(self, now: int, system: int) -> bool:
+        """Return whether ``system`` is no peer, and has lately sent a statement of another fleet."""
+        return system not in self._peers and system in _recent(self._differing, now)
 
     def _known(self, system: int) -> Peer:
         if system not in self._peers:
@@ -130,8 +153,13 @@ class Agreements:
         if newest is None or newest.plan.epoch < self.since:
             return
         for peer in self._peers.values():
-            if peer.left is None and peer.plans.newest is not None and not peer.doubted(now):
+            if peer.left is None and peer.stated and peer.plans.newest is not None and not peer.doubted(now):
                 self._negotiation.advance(now, peer, newest, self.since)
+
+    @property
+    def fingerprint(self) -> int:
+        """Fingerprint (32 bits) of the settings that the fleet has in common."""
+        return self._fleet.fingerprint
 
     @property
     def members(self) -> frozenset[int]:
@@ -198,17 +226,32 @@ class Agreements:
     @property
     def changed(self) -> bool:
         """Whether an entry has changed since it was last stated."""
-        return any(peer.changed for peer in self._peers.values())
+        return any(peer.changed for peer in self._stated())
 
     def entries(self, *, every: bool) -> tuple[Entry, ...]:
         """Return the entries to state, ``every`` one or those that changed, and count them as stated."""
-        found = [peer.entry() for _, peer in sorted(self._peers.items()) if every or peer.changed]
+        found = [peer.entry() for peer in self._stated() if every or peer.changed]
         if every:
             found += [Entry(system) for system in sorted(self.members - self._peers.keys())]
         return tuple(found)
 
+    def _stated(self) -> list[Peer]:
+        """Return the peers to state, by system id.
+
+        They are the expected ones and those that have the fleet's fingerprint. One of which only plans were
+        received may be of another fleet, and receivers of its name would wait for it.
+        """
+        known = sorted(self._peers.items())
+        return [peer for system, peer in known if peer.stated or system in self._config.fleet]
+
     def refused_senders(self, now: int) -> RefusedSenders:
         """Return the senders whose plans are refused at ``now`` (µs)."""
-        doubled = (system for system, peer in self._peers.items() if peer.doubted(now))
-        foreign = (system for system, time in self._foreign.items() if now - time < _FOREIGN_US)
-        return RefusedSenders(tuple(sorted(doubled)), tuple(sorted(foreign)))
+        foreign = _recent(self._foreign, now)
+        differing = (_recent(self._differing, now) | _recent(self._other_knots, now)) - foreign
+        doubled = {system for system, peer in self._peers.items() if peer.doubted(now)} - foreign - differing
+        return RefusedSenders(*(tuple(sorted(found)) for found in (doubled, foreign, differing)))
+
+
+def _recent(times: dict[int, int], now: int) -> set[int]:
+    """Return the systems whose time is less than ``_FOREIGN_US`` before ``now`` (µs)."""
+    return {system for system, time in times.items() if now - time < _FOREIGN_US}

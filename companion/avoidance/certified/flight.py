@@ -9,6 +9,7 @@ from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.commitment import Commitment, HoldReason
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.fingerprint import identity
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.separating_planes import keeps
 from companion.avoidance.field.planner import Aim
@@ -46,7 +47,7 @@ class CertifiedFlight:
             own.system,
             certified,
             steps,
-            fleet.checksum,
+            identity(config, fleet),
             lambda newest, one, other: keeps(newest, one, other, distance, upright=planar),
         )
         self.clocks = ClockWatch(own, certified.clock_us)
@@ -232,7 +233,7 @@ class CertifiedFlight:
             return []
         self._next_announcement = now + self._config.certified.repeat_us
         epoch, since = self.commitment.epoch(now), self.agreements.since
-        statement = Statement(self.agreements.frame, epoch, since, away=True)
+        statement = Statement(self.agreements.fingerprint, epoch, since, away=True)
         return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(statement))]
 
     def _repeated(self) -> list[WirePlan]:
@@ -247,5 +248,5 @@ class CertifiedFlight:
         if not every and not agreements.changed:
             return []
         entries = agreements.entries(every=every)
-        statement = Statement(agreements.frame, epoch, agreements.since, entries, farewell)
+        statement = Statement(agreements.fingerprint, epoch, agreements.since, entries, farewell)
         return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(part)) for part in in_messages(statement)]

@@ -48,17 +48,28 @@ class Peer:
     def receive_plan(self, now: int, plan: StoredPlan) -> bool:
         """File a plan of the peer.
 
-        Returns False if it contradicts a filed plan: two vehicles have this id. Then the agreements are
-        discarded; the own plan keeps them until there is a new one, because without an agreement it is
-        carried on.
+        Returns False if it contradicts a filed plan: two vehicles have this id, see ``contradict``.
         """
         if self.plans.add(plan, (one.other for one in self.pair.referenced())):
             self.last_received = now
             self._end_departure(plan)
             return True
+        self.contradict(now)
+        return False
+
+    def contradict(self, now: int) -> None:
+        """Discard all agreements, and make none for some time: two vehicles have this id.
+
+        The own plan keeps the agreements until there is a new one, because without an agreement it is carried
+        on.
+        """
         self._conflict = now
         self.void()
-        return False
+
+    @property
+    def stated(self) -> bool:
+        """Whether a statement of the peer was received: its sender has the fleet's fingerprint."""
+        return self._statement_epoch > 0
 
     def _end_departure(self, plan: StoredPlan) -> None:
         """Take the peer for back if ``plan`` is later than its last plan, and not that plan carried on."""

@@ -14,6 +14,7 @@ from companion.flight.guard import Holding
 from companion.flight.health_monitor import HealthInputs, HealthMonitor, Reaction
 from companion.flight.vehicle import Vehicle
 from companion.values.phase import Phase
+from companion.values.refused_senders import RefusedSenders
 from companion.world import View
 from mavlink_bridge.messages import (
     CommandLong,
@@ -119,6 +120,9 @@ LIMITS = {
         TO_LAND,
     ),
     "a jump to nowhere": ("origin", {}, {"moves": 1, "displaced": math.nan}, TO_LAND),
+    "plans in another frame": ("foreign", {}, {"refused": RefusedSenders(foreign=(12,))}, TELL),
+    "another fleet file": ("differing", {}, {"refused": RefusedSenders(differing=(12,))}, TELL),
+    "two vehicles with an id": ("doubled", {}, {"refused": RefusedSenders(doubled=(12,))}, TELL),
     "who took it over": ("custody", {"phase": Phase.ESCORT}, {"phase": Phase.YIELDED}, TELL),
 }
 
@@ -150,7 +154,7 @@ def test_a_concern_begins_at_its_limit_is_said_once_and_ends(name):
 def test_on_the_ground_nothing_of_a_flight_concerns_it(phase):
     watch = HealthMonitor(FENCED)
     for _, _, bad, _ in LIMITS.values():
-        if "phase" not in bad and not {"late", "clock_steps", "neighbours"} & set(bad):
+        if "phase" not in bad and not {"late", "clock_steps", "neighbours", "refused"} & set(bad):
             assert watch.look(situation(**{**bad, "phase": phase})) == []
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from companion.avoidance.certified.committed import carried_on, controls, resting, rests
+from companion.avoidance.certified.fingerprint import FleetIdentity
 from companion.values.horizon import Array
 from mavlink_bridge.wire.agreements import Entry, Epochs, Statement
 from mavlink_bridge.wire.plan import Integers, WirePlan
@@ -20,7 +21,8 @@ BEGAN = 1_767_225_600_000_000
 REQUIRED = 1.2
 COPIES = 4
 """A plan is told so often."""
-TERMS = Terms((11, 12), frozenset(), DT, EPOCH, STEPS, 7, REQUIRED, (2000, 2000, 2000), False)
+IDENTITY = FleetIdentity(0xABCDEF12, 7)
+TERMS = Terms((11, 12), frozenset(), DT, EPOCH, STEPS, IDENTITY, REQUIRED, (2000, 2000, 2000), False)
 
 
 ABOUT_AGREEMENTS = frozenset(
@@ -31,7 +33,7 @@ ABOUT_AGREEMENTS = frozenset(
         "a plan without a statement",
         "a plan without an agreement",
         "a statement heard that its sender did not tell",
-        "a statement in another frame",
+        "a statement of another fleet",
         "an agreement dropped",
         "an agreement nearer than the one before",
         "an agreement on a plan newer than the own one",
@@ -44,7 +46,7 @@ ABOUT_AGREEMENTS = frozenset(
 
 def standing(place: Sequence[float], epoch: int = BEGAN) -> WirePlan:
     """To stand at ``place`` m."""
-    return resting(epoch, DT, STEPS, place, TERMS.origin)
+    return resting(epoch, DT, STEPS, place, TERMS.fleet_identity.origin)
 
 
 def on(plan: WirePlan, epochs: int = 1) -> WirePlan:
@@ -118,9 +120,8 @@ class Told:
         for again in (False, True):
             for sender, plan in speak.items():
                 entries = [self._entry(sender, peer, again=again) for peer in self._plans if peer != sender]
-                self.state(
-                    sender, Statement(self._terms.frame, plan.epoch, self._since[sender], tuple(entries))
-                )
+                fingerprint, since = self._terms.fleet_identity.fingerprint, self._since[sender]
+                self.state(sender, Statement(fingerprint, plan.epoch, since, tuple(entries)))
             self._heard_since = dict(self._since)
 
     def _entry(self, sender: int, peer: int, *, again: bool) -> Entry:
@@ -150,7 +151,7 @@ class Told:
 
 
 def _sound(plan: WirePlan) -> bool:
-    known = plan.origin == TERMS.origin and plan.dt == DT and len(plan.accelerations) == STEPS
+    known = plan.origin == TERMS.fleet_identity.origin and plan.dt == DT and len(plan.accelerations) == STEPS
     return known and plan.epoch % EPOCH == 0 and rests(plan)
 
 

@@ -232,7 +232,9 @@ def proposed(*, lacks: bool, considers: bool, epoch: int) -> Evidence:
 
     def state(system: int, epoch: int, kept: tuple[Epochs, ...], considered: Epochs) -> None:
         entry = Entry(23 - system, kept, considered)
-        told.state(system, Statement(TERMS.frame, epoch, BEGAN, (entry,)), at(1) - EPOCH // 4)
+        told.state(
+            system, Statement(TERMS.fleet_identity.fingerprint, epoch, BEGAN, (entry,)), at(1) - EPOCH // 4
+        )
 
     state(11, at(1), (first, second), second)
     state(12, epoch, (first,) if lacks else (first, second), second if considers else first)
@@ -285,10 +287,14 @@ def parting(*, farewell: bool, newest: bool = True) -> Evidence:
     told.of_epoch({11: [plans[1]], 12: [on(B)]})
     if not newest:
         told.plan(12, on(B, 2))
-    told.state(12, Statement(TERMS.frame, at(1), at(2) if farewell else BEGAN, (), farewell))
+    told.state(
+        12, Statement(TERMS.fleet_identity.fingerprint, at(1), at(2) if farewell else BEGAN, (), farewell)
+    )
     for plan in plans[2:]:
         told.plan(11, plan)
-        told.state(11, Statement(TERMS.frame, plan.epoch, BEGAN, (Entry(12, departed=True),)))
+        told.state(
+            11, Statement(TERMS.fleet_identity.fingerprint, plan.epoch, BEGAN, (Entry(12, departed=True),))
+        )
     return told.evidence()
 
 
@@ -350,12 +356,12 @@ def test_what_was_heard_must_have_been_stated() -> None:
     assert ("a statement heard that its sender did not tell", (12, 11)) in found(verdict)
 
 
-def test_a_statement_in_another_frame_is_found_and_does_not_count() -> None:
+def test_a_statement_of_another_fleet_is_found_and_does_not_count() -> None:
     def elsewhere(statement: Statement) -> Statement:
-        return statement._replace(frame=TERMS.frame + 256)
+        return statement._replace(fingerprint=TERMS.fleet_identity.fingerprint + 256)
 
     verdict = judge(changed(swarm(), 12, at(2), elsewhere))
-    assert ("a statement in another frame", (12,)) in found(verdict)
+    assert ("a statement of another fleet", (12,)) in found(verdict)
     assert ("an agreement dropped", (11, 12)) in found(verdict)
 
 
@@ -364,7 +370,7 @@ def test_that_a_vehicle_is_away_changes_nothing() -> None:
     plans = {11: aside(A), 12: aside(B)}
     for number in range(EPOCHS):
         told.of_epoch({system: [sent[number]] for system, sent in plans.items()})
-        told.state(12, Statement(TERMS.frame, at(number), BEGAN, away=True))
+        told.state(12, Statement(TERMS.fleet_identity.fingerprint, at(number), BEGAN, away=True))
     assert judge(told.evidence()).findings == judge(swarm()).findings == ()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from companion.avoidance.certified.fingerprint import FleetIdentity
 from mavlink_bridge.wire.agreements import Statement
 from mavlink_bridge.wire.plan import Integers, WirePlan
 
@@ -13,9 +14,9 @@ class Terms(NamedTuple):
 
     ``fleet``: system ids that share committed plans, which are judged; ``apart``: system ids of moving
     obstacles, whose plans are not judged. ``dt``: time between knots (µs); ``epoch``: time between plans
-    (µs); ``steps``: number of knots of a plan; ``frame``: 32-bit checksum of the fleet frame; ``required``:
-    least distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²); ``upright``:
-    whether only horizontal distances count.
+    (µs); ``steps``: number of knots of a plan; ``fleet_identity``: fingerprints in plans and statements;
+    ``required``: least distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²);
+    ``upright``: whether only horizontal distances count.
     """
 
     fleet: tuple[int, ...]
@@ -23,15 +24,10 @@ class Terms(NamedTuple):
     dt: int
     epoch: int
     steps: int
-    frame: int
+    fleet_identity: FleetIdentity
     required: float
     a_max: Integers
     upright: bool
-
-    @property
-    def origin(self) -> int:
-        """Fingerprint of the fleet frame in a plan: the low 8 bits of its checksum."""
-        return self.frame & 0xFF
 
 
 class LoggedPlan(NamedTuple):

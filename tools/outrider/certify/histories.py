@@ -127,8 +127,9 @@ def _flaw(plan: WirePlan, terms: Terms, seen: Sequence[int]) -> tuple[str, str] 
     if not rests(plan):
         left = plan.states()[-1, 1] * 1e-3 * plan.dt * 1e-6
         return "a plan that does not end at rest", f"{float((left @ left) ** 0.5):.4f} m/s left"
-    if plan.origin != terms.origin:
-        return "a plan in another frame", f"fingerprint {plan.origin}, the fleet's is {terms.origin}"
+    if plan.origin != terms.fleet_identity.origin:
+        figures = f"fingerprint {plan.origin}, the fleet's is {terms.fleet_identity.origin}"
+        return "a plan in another frame", figures
     if plan.dt != terms.dt or len(plan.accelerations) != terms.steps or plan.epoch % terms.epoch:
         knots = f"{len(plan.accelerations)} knots of {plan.dt} µs from {plan.epoch} µs"
         fleet = f"the fleet's are {terms.steps} of {terms.dt} µs from k·{terms.epoch} µs"

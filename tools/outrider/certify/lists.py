@@ -157,9 +157,10 @@ def listings(
                 peers.setdefault(sender, _Peer(owner, sender)).receive_plan(record.plan.epoch)
             continue
         statement = record.statement
-        if statement.frame != terms.frame:
-            what = "a statement in another frame"
-            figures = f"checksum {statement.frame:08x}, the fleet's is {terms.frame:08x}"
+        if statement.fingerprint != terms.fleet_identity.fingerprint:
+            what = "a statement of another fleet"
+            fleet = terms.fleet_identity.fingerprint
+            figures = f"fingerprint {statement.fingerprint:08x}, the fleet's is {fleet:08x}"
             findings += [Finding(what, (owner,), record.time, figures)] * (sender == owner)
         elif statement.away:
             continue

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from companion.avoidance.certified.fingerprint import identity
 from companion.avoidance.certified.margins import between
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.frames import FleetFrame
@@ -85,7 +86,7 @@ def terms_of(scenario: Scenario) -> Terms:
         certified.dt_us,
         certified.epoch_us,
         config.horizon.steps + 1,
-        FleetFrame(origin.latitude, origin.longitude, origin.altitude).checksum,
+        identity(config, FleetFrame(origin.latitude, origin.longitude, origin.altitude)),
         between(certified, config.field, limits),
         (x, y, z),
         config.planar,

@@ -193,7 +193,9 @@ class Swarm:
         *,
         epoch: int = 200_000,
         strangers: bool = False,
+        others: Mapping[int, Mapping[str, object]] | None = None,
     ) -> None:
+        """``others``: other certified settings of some vehicles, by system id."""
         fleet = tuple(range(1, len(starts) + 1))
         certified = CertifiedConfig(epoch_us=epoch, fleet=() if strangers else fleet)
         self.config = CompanionConfig(
@@ -201,7 +203,7 @@ class Swarm:
         )
         self.d = between(self.config.certified, self.config.field, self.config.limits)
         self.vehicles = [
-            Vehicle(system, self.config, np.array(place), habit)
+            Vehicle(system, self._config_of(others or {}, system), np.array(place), habit)
             for system, place, habit in zip(fleet, starts, habits, strict=True)
         ]
         self._rng, self._rough, self._serial = np.random.default_rng(seed), rough, count()
@@ -214,6 +216,10 @@ class Swarm:
         """When (µs of the run) who flies beside whose last plan although that has made another."""
         self.mistaken: list[Kept] = []
         """Agreements of which somebody holds other plans than those that are flown."""
+
+    def _config_of(self, others: Mapping[int, Mapping[str, object]], system: int) -> CompanionConfig:
+        certified = self.config.certified.model_copy(update=others.get(system, {}))
+        return self.config.model_copy(update={"certified": certified})
 
     def run(self, until: int, goals: Callable[[int, int], Array]) -> None:
         """From the beginning until ``until`` µs; ``goals`` by time and system."""

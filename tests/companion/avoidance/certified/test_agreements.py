@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.committed import carried_on, committed, controls, resting
+from companion.avoidance.certified.fingerprint import FleetIdentity
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.separating_planes import keeps
 from companion.config.certified import CertifiedConfig
@@ -32,7 +33,7 @@ def kept_apart(newest: Array, own: Array, other: Array) -> bool:
 
 def agreements(own: int = OWN, *expected: int) -> Agreements:
     config = CertifiedConfig(epoch_us=LENGTH, dt_us=DT, fleet=expected)
-    return Agreements(own, config, STEPS, FRAME, kept_apart)
+    return Agreements(own, config, STEPS, FleetIdentity(FRAME, FRAME & 0xFF), kept_apart)
 
 
 def plan(number: int = 0, x: float = 0.0, speed: float = 0.0) -> WirePlan:
@@ -237,23 +238,23 @@ def test_any_other_bytes_are_refused(data: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ("bad", "foreign"),
+    ("bad", "refused"),
     [
-        (plan()._replace(origin=8), 1),
-        (plan()._replace(dt=100_000), 1),
-        (plan()._replace(epoch=EPOCH + 4), 1),
-        (plan(5), 0),
-        (plan(-13), 0),
-        (plan()._replace(velocity=(1, 0, 0)), 0),
-        (plan()._replace(accelerations=plan().accelerations[:-1]), 1),
+        (plan()._replace(origin=8), RefusedSenders(foreign=(OTHER,))),
+        (plan()._replace(dt=100_000), RefusedSenders(differing=(OTHER,))),
+        (plan()._replace(epoch=EPOCH + 4), RefusedSenders(differing=(OTHER,))),
+        (plan(5), RefusedSenders()),
+        (plan(-13), RefusedSenders()),
+        (plan()._replace(velocity=(1, 0, 0)), RefusedSenders()),
+        (plan()._replace(accelerations=plan().accelerations[:-1]), RefusedSenders(differing=(OTHER,))),
     ],
     ids=["frame", "step", "between epochs", "far ahead", "long ago", "does not rest", "short"],
 )
-def test_what_cannot_be_a_committed_plan_is_refused(bad: WirePlan, foreign: int) -> None:
+def test_what_cannot_be_a_committed_plan_is_refused(bad: WirePlan, refused: RefusedSenders) -> None:
     one = agreements()
     one.receive_plan(NOW, OTHER, pack(bad))
     assert one.refused == 1
-    assert one.refused_senders(NOW) == RefusedSenders((), (OTHER,) if foreign else ())
+    assert one.refused_senders(NOW) == refused
     assert one.refused_senders(NOW + 5_000_000) == RefusedSenders()
     assert not one.members
 
@@ -283,13 +284,57 @@ def test_two_plans_of_an_epoch_show_two_vehicles_with_an_id() -> None:
     assert one.refused_senders(NOW + 5_000_000) == RefusedSenders()
 
 
-def test_a_statement_in_another_frame_is_refused_though_eight_bits_of_it_agree() -> None:
+def test_a_statement_of_another_fleet_is_refused_though_eight_bits_of_it_agree() -> None:
     one = agreements()
     other = Statement(FRAME ^ 0x100, EPOCH, EPOCH, (Entry(OWN), Entry(THIRD)))
     one.receive_statement(NOW, OTHER, other)
     assert one.refused == 1
-    assert one.refused_senders(NOW).foreign == (OTHER,)
+    assert one.refused_senders(NOW).differing == (OTHER,)
     assert not one.members
+
+
+def test_of_a_vehicle_of_another_fleet_no_plan_is_accepted_whichever_message_comes_first() -> None:
+    one = agreements()
+    other = Statement(FRAME ^ 0x100, EPOCH, EPOCH, (Entry(OWN),))
+    one.receive_plan(NOW, OTHER, pack(plan()))
+    assert one.members == {OTHER}
+    one.receive_statement(NOW, OTHER, other)
+    assert not one.members
+    one.receive_plan(NOW, OTHER, pack(plan()))
+    assert not one.members
+    assert one.refused == 2
+    # Its sender begins again, with the settings of this fleet.
+    later = NOW + 5_000_000
+    one.receive_plan(later, OTHER, pack(plan(25)))
+    one.receive_statement(later, OTHER, statement(25, Entry(OWN), since=25))
+    assert one.members == {OTHER}
+    assert one.refused_senders(later) == RefusedSenders()
+
+
+def test_without_a_statement_nothing_is_proposed() -> None:
+    """The sender of the plan may be of another fleet."""
+    one = agreements()
+    one.begin(EPOCH)
+    one.made(plan())
+    one.receive_plan(NOW, OTHER, pack(plan(x=4.0)))
+    one.update(NOW)
+    assert not one.kept()[OTHER]
+    one.receive_statement(NOW, OTHER, statement(0, Entry(OWN)))
+    one.update(NOW)
+    assert one.kept()[OTHER]
+
+
+def test_an_id_that_sends_statements_of_two_fleets_stops_the_planning_beside_it() -> None:
+    two = agreed()
+    two.first.receive_statement(NOW, OTHER, Statement(FRAME ^ 1, EPOCH, EPOCH, (Entry(OWN),)))
+    assert two.first.missing() == {OTHER}
+    assert two.first.refused_senders(NOW) == RefusedSenders(differing=(OTHER,))
+    two.agree(NOW)
+    assert two.first.missing() == {OTHER}
+    for system, x in ((OWN, 0.0), (OTHER, 4.0)):
+        two.make(system, plan(25, x))
+    two.agree(NOW + 25 * LENGTH)
+    assert not two.first.missing() | two.second.missing()
 
 
 def test_a_statement_by_a_clock_that_is_far_ahead_is_refused_and_stands_in_no_ones_way() -> None:
@@ -318,6 +363,7 @@ def test_who_is_expected_is_missing_until_there_is_an_agreement() -> None:
 
 @pytest.mark.parametrize("by", ["plan", "statement", "name"])
 def test_who_is_heard_or_named_is_a_member_and_never_forgotten(by: str) -> None:
+    """It is named to others as soon as a statement shows that it is of this fleet."""
     one = agreements()
     if by == "plan":
         one.receive_plan(NOW, THIRD, pack(plan()))
@@ -328,7 +374,7 @@ def test_who_is_heard_or_named_is_a_member_and_never_forgotten(by: str) -> None:
     for number in range(20):
         assert THIRD in one.members
         assert THIRD in one.missing()
-        assert THIRD in {entry.peer for entry in one.entries(every=True)}
+        assert (THIRD in {entry.peer for entry in one.entries(every=True)}) == (by != "plan")
         one.receive_statement(NOW + number * LENGTH, OTHER, statement(number, Entry(OWN)))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from companion.avoidance.certified.committed import resting
+from companion.avoidance.certified.fingerprint import fingerprint
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.margins import beside, between
 from companion.avoidance.field.planner import standing
@@ -45,7 +46,7 @@ def leave(flight: CertifiedFlight, end: Array) -> None:
     """The other says farewell with a plan at rest at ``end`` (3,), m."""
     agreements = flight.agreements
     agreements.receive_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
-    farewell = Statement(FLEET.checksum, EPOCH, EPOCH, (Entry(OWN),), farewell=True)
+    farewell = Statement(fingerprint(CONFIG, FLEET), EPOCH, EPOCH, (Entry(OWN),), farewell=True)
     agreements.receive_statement(EPOCH, LEFT, farewell)
     assert agreements.left.keys() == {LEFT}
 
