@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import compress
+from itertools import chain, compress
 from math import inf
 
 import numpy as np
@@ -359,6 +359,8 @@ class Neighbours:
         """Update the rows of the neighbours received since the last update."""
         if not self._fresh:
             return
-        rows = list(self._fresh)
-        self._states[rows], self._times[rows], self._arrivals[rows] = zip(*self._fresh.values(), strict=True)
+        rows = np.array(list(self._fresh))
+        states, self._times[rows], self._arrivals[rows] = zip(*self._fresh.values(), strict=True)
+        # Twice as fast as an array of tuples.
+        self._states[rows] = np.fromiter(chain.from_iterable(states), np.float64).reshape(-1, 6)
         self._fresh.clear()
