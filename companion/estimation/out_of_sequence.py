@@ -47,8 +47,7 @@ class OutOfSequenceBuffer:
         A measurement from before the window is refused and counted. A measurement with the same sender's
         stamp as an earlier one is a duplicate: it is ignored, and the answer is that of the earlier one.
         """
-        times = self._times
-        time = dated.time
+        times, (time, _) = self._times, dated
         if times and time <= times[-1]:
             if time < times[-1] - self._window:
                 self.too_late += 1

@@ -71,13 +71,16 @@ class PlanClock:
 
     def _begins_first(self, now: int, epoch: int, dt: int) -> int | None:
         """Return when a plan begins that is received for the first time."""
-        dated = self._clock.date(now, epoch)
-        if dated is None or not dated.stamped:
+        clock = self._clock
+        dated = clock.date(now, epoch)
+        if dated is None:
             return None
-        estimate = dated.time + self._clock.skew
-        possible = now - self._stale <= epoch <= now + dt
-        if abs(estimate - epoch) <= _EPOCH_TOLERANCE_US or (
-            possible and self._clock.support < _MIN_PLANS_POSSIBLE_EPOCH
-        ):
+        time, stamped = dated
+        if not stamped:
+            return None
+        estimate = time + clock.skew
+        if -_EPOCH_TOLERANCE_US <= estimate - epoch <= _EPOCH_TOLERANCE_US:
             return epoch
-        return estimate if self._clock.support >= _MIN_PLANS else None
+        if now - self._stale <= epoch <= now + dt and clock.support < _MIN_PLANS_POSSIBLE_EPOCH:
+            return epoch
+        return estimate if clock.support >= _MIN_PLANS else None

@@ -137,7 +137,8 @@ class SenderClock:
         self.lost = 0
         self._lag = 0
         self._answered: int | None = None
-        self._last_lags: deque[int] = deque(maxlen=_LAST_LAGS)
+        # A ring; its order has no meaning.
+        self._last_lags: list[int] = []
         self._delay = delay
         self._tolerance = max(latest, _CLOCK_STEP_US)
         # Track time minus stamp; None before the first stamp, and while the stamps are unusable.
@@ -162,13 +163,14 @@ class SenderClock:
         """
         if stamp <= 0:
             return self._by_arrival(received)
-        if not self._begun:
-            return self._begin(_Outlier(received, stamp), received - stamp, 1)
-        if self._base is None:
+        base = self._base
+        if base is None:
+            if not self._begun:
+                return self._begin(_Outlier(received, stamp), received - stamp, 1)
             return self._outlier(_Outlier(received, stamp))
         lag = received - stamp
-        elapsed = received - self._received
-        expected = self._line + self._rate * elapsed if elapsed > 0 else self._line
+        elapsed, before = received - self._received, self._line
+        expected = before + self._rate * elapsed if elapsed > 0 else before
         if stamp < self._newest - self._tolerance or lag < expected - self._tolerance:
             return self._outlier(_Outlier(received, stamp))
         if stamp != self._stamp:
@@ -182,20 +184,24 @@ class SenderClock:
                 return self._by_arrival(received)
         if self._outliers:
             self._outliers.clear()
-        self.support += 1
-        self._lag = lag
-        self._last_lags.append(lag)
-        least = self._least
-        if self.brief or received >= least.begun + _PIECE_US or elapsed < 0:
+        support = self.support
+        self.support = support + 1
+        self._lag = self._last_lags[support % _LAST_LAGS] = lag
+        begun, _, least, _ = self._least
+        if self.brief or received >= begun + _PIECE_US or elapsed < 0:
             self._follow(received, lag, expected)
+            self.skew = round(self._line) - self._delay - base
         else:
             # As ``_follow``, for most messages.
             self._received = received
-            self._line = line = float(lag) if lag < expected else expected
-            if lag < least.lag:
-                self._least = Piece(least.begun, received, lag, lag - line)
-        self.skew = round(self._line) - self._delay - self._base
-        return TrackTime(stamp + self._base, True)
+            line = float(lag) if lag < expected else expected
+            if line != before:
+                self._line = line
+                self.skew = round(line) - self._delay - base
+            if lag < least:
+                self._least = Piece(begun, received, lag, lag - line)
+        # As TrackTime(…), in half the time.
+        return tuple.__new__(TrackTime, (stamp + base, True))
 
     def reads(self, received: int, stamp: int) -> int:
         """Return when the content of another message of this sender was true, on the companion's clock.
@@ -264,8 +270,7 @@ class SenderClock:
         self._repeats, self._repeated = 0, received
         self._outliers.clear()
         self._answered, self._lag = None, lag
-        self._last_lags.clear()
-        self._last_lags.append(lag)
+        self._last_lags = [lag] * _LAST_LAGS
         self._received, self._line, self._rate = received, float(lag), 0.0
         self._pieces.clear()
         self._least = Piece(received, received, lag, 0.0)

@@ -43,7 +43,11 @@ class State(NamedTuple):
 
 
 class Track:
-    """Filter of the measurements of one sender; times are the companion's own, in µs."""
+    """Filter of the measurements of one sender; times are the companion's own, in µs.
+
+    ``belief``: filter state after the last measurement; ``time``: when the last accepted measurement was
+    true, µs. Both are None before the first; do not change them.
+    """
 
     __slots__ = (
         "_clock",
@@ -51,6 +55,8 @@ class Track:
         "_implausible",
         "_rewind",
         "_undated",
+        "belief",
+        "time",
     )
 
     def __init__(self, config: TrackConfig) -> None:
@@ -58,6 +64,8 @@ class Track:
         self._clock = SenderClock(config.delay_us, config.rewind_us)
         self._rewind = OutOfSequenceBuffer(estimator(config), config.rewind_us)
         self._implausible = self._undated = 0
+        self.belief: Belief | None = None
+        self.time: int | None = None
 
     @property
     def brief(self) -> bool:
@@ -69,29 +77,19 @@ class Track:
         self._clock.brief = value
 
     @property
-    def time(self) -> int | None:
-        """Time (µs) at which the last accepted measurement was true; None before the first."""
-        belief = self._rewind.belief
-        return None if belief is None else belief.time + self._clock.skew
-
-    @property
     def rejected(self) -> int:
         """Number of discarded measurements: implausible, not datable, too late, or refused by the gate."""
-        belief = self._rewind.belief
-        refused = 0 if belief is None else belief.refused
-        return self._implausible + self._undated + self._rewind.too_late + refused
+        return self._implausible + self._undated + self._rewind.too_late + self.refused
 
     @property
     def refused(self) -> int:
         """Number of measurements that the gate refused."""
-        belief = self._rewind.belief
-        return 0 if belief is None else belief.refused
+        return 0 if self.belief is None else self.belief.refused
 
     @property
     def doubted(self) -> bool:
         """Whether recent measurements contradict the current state (a hypothesis beside it is pending)."""
-        belief = self._rewind.belief
-        return belief is not None and bool(belief.doubts)
+        return self.belief is not None and bool(self.belief.doubts)
 
     @property
     def clock_steps(self) -> int:
@@ -118,7 +116,15 @@ class Track:
         if dated is None:
             self._undated += 1
             return False
-        return self._rewind.put(dated, z)
+        accepted = self._rewind.put(dated, z)
+        self._update()
+        return accepted
+
+    def _update(self) -> None:
+        """Update ``belief`` and ``time``."""
+        self.belief = belief = self._rewind.belief
+        if belief is not None:
+            self.time = belief.time + self._clock.skew
 
     @property
     def late(self) -> int:
@@ -140,6 +146,7 @@ class Track:
         """
         if self._config.stamps:
             self._clock.answered(received, asked, stamp)
+            self._update()
 
     def when(self, received: int, stamp: int) -> int:
         """Return when the content of another message of the same sender was true, µs.
@@ -154,10 +161,10 @@ class Track:
         Extrapolation ends after ``extrapolate_us``; from then on the state stays there at rest. Before the
         last accepted measurement the result is the state at this measurement, with a negative age.
         """
-        belief = self._rewind.belief
-        if belief is None:
+        belief, time = self.belief, self.time
+        if belief is None or time is None:
             return None
-        age = now - self._clock.skew - belief.time
+        age = now - time
         longest = self._config.extrapolate_us
         dt = 1e-6 * (longest if age > longest else age if age > 0 else 0)
         a, b, c, d, e, f = belief.x
@@ -200,9 +207,9 @@ class Track:
         return math.sqrt(p + dt * (2.0 * c + dt * v) + grown)
 
     def _known_belief(self) -> Belief:
-        if self._rewind.belief is None:
+        if self.belief is None:
             raise ValueError("nothing has been heard yet: there is no state")
-        return self._rewind.belief
+        return self.belief
 
 
 def measured(position: Three, velocity: Three | None, *, upward: bool) -> Measured | None:

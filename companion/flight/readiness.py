@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.flight.autopilot_limits import AutopilotLimits
-from companion.flight.autopilots import Params
+from companion.flight.autopilots import Params, Profile
 from companion.flight.command_protocol import Commands
 from companion.flight.vehicle import Vehicle
 from companion.world import View
@@ -70,6 +70,8 @@ class Readiness:
         self._vehicle = vehicle
         self._commands = calls
         self._requests = Commands(calls.own)
+        # The profile of the autopilot that has answered all requests of ``wishes``.
+        self._fulfilled: Profile | None = None
         certified = config.certified
         self._utc = certified.fleet_time == "measured" and certified.time_sources.autopilot_us is not None
         self.limits = AutopilotLimits(config, vehicle, calls.own)
@@ -81,6 +83,7 @@ class Readiness:
     def forget(self) -> None:
         """Forget the requests of ``wishes`` and the parameters; ``calls`` is not reset."""
         self._requests.forget()
+        self._fulfilled = None
         self.limits.forget()
 
     @property
@@ -95,11 +98,12 @@ class Readiness:
         required and optional messages are requested by the same command.
         """
         profile = self._vehicle.profile
-        if profile is None or not self._vehicle.alive:
+        if profile is None or profile is self._fulfilled or not self._vehicle.alive:
             return []
         for call in _optional_requests(profile.estimator_message, self._utc):
             if not self._requests.answered(*call):
                 return self._requests.call(now, *call)
+        self._fulfilled = profile
         return []
 
     def unseen(self, view: View) -> str:

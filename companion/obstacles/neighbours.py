@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import compress
+from itertools import chain, compress
 from math import inf
 
 import numpy as np
@@ -64,6 +64,23 @@ def fading(config: CompanionConfig) -> Array | None:
     return np.asarray(np.exp(-ahead / config.guard.astray_us))[:, None]
 
 
+class _Sender:
+    """A system whose position is known.
+
+    ``track``, ``row`` of its last state; ``by_autopilot``: whether the track uses its autopilot's messages.
+    ``companion_time``: when (µs) its companion last reported its position; ``received``: when (µs) a message
+    last changed its time.
+    """
+
+    __slots__ = ("by_autopilot", "companion_time", "received", "row", "track")
+
+    def __init__(self, track: Track, row: int) -> None:
+        self.track, self.row = track, row
+        self.by_autopilot = False
+        self.companion_time = -_PRIORITY_US
+        self.received = 0
+
+
 class Neighbours:
     """Everything received on the swarm link, by system id."""
 
@@ -72,7 +89,7 @@ class Neighbours:
         self._system = system
         self._fleet = fleet
         self._velocity_up = config.neighbour.velocity_up
-        self._tracks: dict[int, Track] = {}
+        self._senders: dict[int, _Sender] = {}
         # The tracks' last states as rows, in the order of the tracks. They are sampled together at every
         # plan, after the rows of the tracks that received messages have been updated.
         self._ids: tuple[int, ...] = ()
@@ -81,7 +98,6 @@ class Neighbours:
         self._states: Array = np.zeros((0, 6))
         self._times = np.zeros(0, dtype=np.int64)
         # Arrival times (µs), independent of the times at which the measurements are dated.
-        self._received: dict[int, int] = {}
         self._arrivals = np.zeros(0, dtype=np.int64)
         left = fading(config)
         self._fading: Array = np.zeros(0) if left is None else np.ascontiguousarray(left[:, 0])
@@ -95,10 +111,6 @@ class Neighbours:
         self.refused_plans = 0
         self.closest = inf
         """m: least distance to a neighbour so far, by its messages; updated if ``guard.near`` is set."""
-        # When (µs) a vehicle's companion last reported its position; whether its track uses its autopilot's
-        # messages.
-        self._companion_time: dict[int, int] = {}
-        self._by_autopilot: dict[int, bool] = {}
         self._brief = False
         # Moving obstacles: they may be larger than a vehicle and are not bound by its limits.
         self._moving_obstacles = {one.system for one in config.moving}
@@ -115,8 +127,8 @@ class Neighbours:
     def brief(self, value: bool) -> None:
         if value != self._brief:
             self._brief = value
-            for track in self._tracks.values():
-                track.brief = value
+            for sender in self._senders.values():
+                sender.track.brief = value
             self._plans.brief = value
 
     def receive_position(self, now: int, message: GlobalPosition) -> None:
@@ -125,35 +137,45 @@ class Neighbours:
         if system == self._system:
             return
         by_autopilot = component == mavlink.MAV_COMP_ID_AUTOPILOT1
-        if by_autopilot and now - self._companion_time.get(system, now - _PRIORITY_US) < _PRIORITY_US:
+        sender = self._senders.get(system)
+        if by_autopilot and sender is not None and now - sender.companion_time < _PRIORITY_US:
             # The vehicle's companion reports the position already, dated by another clock.
             return
-        track = self._tracks.get(system)
-        if track is None or self._by_autopilot[system] != by_autopilot:
+        if sender is None or sender.by_autopilot != by_autopilot:
             track = Track(self._config.neighbour)
             track.brief = self._brief
+        else:
+            track = sender.track
         placed = measurement_of(self._fleet, message, self._velocity_up)
-        refused, before = track.refused, track.time
+        before, time_before = track.belief, track.time
         accepted = track.take(now, placed, message.time_boot)
-        if not by_autopilot and (accepted or track.refused > refused):
+        belief, time = track.belief, track.time
+        if belief is None or time is None:
+            return
+        # Negative if late measurements make the track accept others that it had refused.
+        refused = 0 if before is None else belief.refused - before.refused
+        if sender is None:
+            sender = self._senders[system] = _Sender(track, self._add(now, system))
+        elif track is not sender.track or refused or belief.doubts:
+            self._trusted.restart(now, sender.row)
+        sender.track, sender.by_autopilot = track, by_autopilot
+        if not by_autopilot and (accepted or refused > 0):
             # Unusable positions, such as those of a receiver without a fix, do not suppress the autopilot's
             # messages.
-            self._companion_time[system] = now
-        time = track.time
-        if time is None:
-            return
-        if time != before:
-            self._received[system] = now
-        row = self._rows.get(system)
-        if row is None:
-            row = self._rows[system] = len(self._ids)
-            self._ids += (system,)
-            self._states = np.vstack([self._states, np.zeros(6)])
-            self._times = np.append(self._times, now)
-            self._arrivals = np.append(self._arrivals, now)
-        self._tracks[system], self._by_autopilot[system] = track, by_autopilot
-        self._fresh[row] = track.last, time, self._received[system]
-        self._trusted.note(now, row, track)
+            sender.companion_time = now
+        if time != time_before:
+            sender.received = now
+        self._fresh[sender.row] = belief.x, time, sender.received
+
+    def _add(self, now: int, system: int) -> int:
+        """Add a row for ``system``, first received at ``now`` (µs); return its index."""
+        row = self._rows[system] = len(self._ids)
+        self._ids += (system,)
+        self._states = np.vstack([self._states, np.zeros(6)])
+        self._times = np.append(self._times, now)
+        self._arrivals = np.append(self._arrivals, now)
+        self._trusted.add(now)
+        return row
 
     def receive_plan(self, now: int, message: Tunnel) -> None:
         """Receive a neighbour's TUNNEL message: its horizon, or the uncertainty of its position.
@@ -180,9 +202,10 @@ class Neighbours:
         """Return whether position and plan messages of this sender need not be decoded now."""
         if not self.relevance.ignores(system):
             return False
-        if component != mavlink.MAV_COMP_ID_AUTOPILOT1 and not self._by_autopilot.get(system, True):
+        sender = self._senders.get(system)
+        if component != mavlink.MAV_COMP_ID_AUTOPILOT1 and sender is not None and not sender.by_autopilot:
             # The companion's ignored messages still have priority over its autopilot's.
-            self._companion_time[system] = self.relevance.now
+            sender.companion_time = self.relevance.now
         return True
 
     def _trusted_rows(self) -> NDArray[np.bool_]:
@@ -336,6 +359,8 @@ class Neighbours:
         """Update the rows of the neighbours received since the last update."""
         if not self._fresh:
             return
-        rows = list(self._fresh)
-        self._states[rows], self._times[rows], self._arrivals[rows] = zip(*self._fresh.values(), strict=True)
+        rows = np.array(list(self._fresh))
+        states, self._times[rows], self._arrivals[rows] = zip(*self._fresh.values(), strict=True)
+        # Twice as fast as an array of tuples.
+        self._states[rows] = np.fromiter(chain.from_iterable(states), np.float64).reshape(-1, 6)
         self._fresh.clear()

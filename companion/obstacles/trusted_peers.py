@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.estimation.tracks import Track
 from companion.values.horizon import Array, Located
 
 _CONSISTENT_US = 3_000_000
@@ -25,24 +24,18 @@ class TrustedPeers:
     """Trust of one companion in its neighbours, in the order of the rows of their last states."""
 
     def __init__(self) -> None:
-        self._tracks: list[Track] = []
-        self._refused: list[int] = []
         self._since = np.zeros(0, dtype=np.int64)
 
-    def note(self, now: int, row: int, track: Track) -> None:
-        """Record that a message of the vehicle of ``row`` was received at ``now`` (µs).
+    def add(self, now: int) -> None:
+        """Add a row for a vehicle whose first measurement was accepted at ``now`` (µs)."""
+        self._since = np.append(self._since, now)
 
-        ``row`` is an existing one or the next one. This must be called for every message that was given to
-        the track; otherwise a refused or doubted measurement is missed.
+    def restart(self, now: int, row: int) -> None:
+        """Begin the time of trust in the vehicle of ``row`` again at ``now`` (µs).
+
+        The reason is a new track, or a measurement that was refused or leaves the track in doubt.
         """
-        refused = track.refused
-        if row == len(self._tracks):
-            self._tracks.append(track)
-            self._refused.append(refused)
-            self._since = np.append(self._since, now)
-        elif self._tracks[row] is not track or self._refused[row] != refused or track.doubted:
-            self._tracks[row], self._refused[row] = track, refused
-            self._since[row] = now
+        self._since[row] = now
 
     def trusted(self, now: int, states: Array, plans: Located) -> NDArray[np.bool_]:
         """Return which neighbours (M,) are trusted at ``now`` (µs).

@@ -137,9 +137,8 @@ class HorizonTable:
         self._steps = steps
         self._dt = dt
         self._rows: dict[int, int] = {}
-        self._epochs = np.zeros(0, dtype=np.int64)
-        self._dts = np.zeros(0, dtype=np.int64)
-        self._lasts = np.zeros(0, dtype=np.int64)
+        # Epoch (µs), dt (µs) and index of the last knot of each horizon.
+        self._heads = np.zeros((0, 3), dtype=np.int64)
         self._knots = np.zeros((0, 1, 9))
         self._latest: dict[int, Horizon] = {}
         # The last answer of ``_rows_of``: the same senders, in the same tuple, are asked for again and again.
@@ -157,25 +156,21 @@ class HorizonTable:
 
     def _update_rows(self) -> None:
         """Write the horizons stored since the last call into the table, row by row."""
-        new = [sender for sender in self._fresh if sender not in self._rows]
+        new = len(self._latest) - len(self._rows)
         if new:
-            self._rows.update(zip(new, range(len(self._rows), len(self._latest)), strict=True))
-            self._epochs = np.append(self._epochs, [0] * len(new))
-            self._dts = np.append(self._dts, [1] * len(new))
-            self._lasts = np.append(self._lasts, [0] * len(new))
-            self._knots = np.concatenate([self._knots, np.zeros((len(new), *self._knots.shape[1:]))])
-        fresh = [self._latest[sender] for sender in self._fresh]
-        longest = max(len(horizon.knots) for horizon in fresh)
-        if longest > self._knots.shape[1]:
-            longer = np.zeros((len(self._rows), longest, 9))
-            longer[:, : self._knots.shape[1]] = self._knots
-            self._knots = longer
-        rows = [self._rows[sender] for sender in self._fresh]
-        for row, horizon in zip(rows, fresh, strict=True):
-            self._knots[row, : len(horizon.knots)] = horizon.knots
-        self._epochs[rows] = [horizon.epoch for horizon in fresh]
-        self._dts[rows] = [horizon.dt for horizon in fresh]
-        self._lasts[rows] = [len(horizon.knots) - 1 for horizon in fresh]
+            self._rows = {sender: row for row, sender in enumerate(self._latest)}
+            self._heads = np.concatenate([self._heads, np.tile([0, 1, 0], (new, 1))])
+            self._knots = np.concatenate([self._knots, np.zeros((new, *self._knots.shape[1:]))])
+        rows, heads = [], []
+        for sender in self._fresh:
+            row, (epoch, dt, knots) = self._rows[sender], self._latest[sender]
+            count, longest = len(knots), self._knots.shape[1]
+            if count > longest:
+                self._knots = np.pad(self._knots, ((0, 0), (0, count - longest), (0, 0)))
+            self._knots[row, :count] = knots
+            rows.append(row)
+            heads.append((epoch, dt, count - 1))
+        self._heads[rows] = heads
         self._fresh.clear()
 
     def positions(self, senders: Sequence[int], start: int, oldest: int) -> tuple[Array, NDArray[np.bool_]]:
@@ -197,8 +192,9 @@ class HorizonTable:
             return Located(np.zeros((len(senders), 3)), none, np.zeros_like(none))
         positions, known = np.zeros((len(senders), 1, 3)), np.zeros(len(senders), dtype=np.bool_)
         self._sample(rows, times, -_NO_PLAN_US, positions, known)
-        after = np.where(known, times - self._epochs[rows], _NO_PLAN_US)
-        return Located(positions[:, 0], after, self._dts[rows])
+        heads = self._heads[rows]
+        after = np.where(known, times - heads[:, 0], _NO_PLAN_US)
+        return Located(positions[:, 0], after, heads[:, 1])
 
     def accelerations(self, senders: Sequence[int], times: NDArray[np.int64]) -> Array:
         """Return the planned accelerations (M, 3), m/s², of ``senders`` (M,).
@@ -210,8 +206,8 @@ class HorizonTable:
         rows = self._rows_of(senders)
         if not self._rows:
             return np.zeros((len(senders), 3))
-        elapsed = times - self._epochs[rows]
-        segments = np.clip(elapsed // self._dts[rows], 0, self._lasts[rows])
+        epochs, dts, lasts = self._heads[rows].T
+        segments = np.clip((times - epochs) // dts, 0, lasts)
         planned: Array = self._knots[rows, segments, 6:9]
         return np.where((rows >= 0)[:, None], planned, 0.0)
 
@@ -237,26 +233,13 @@ class HorizonTable:
 
         ``known`` (M,) becomes true for horizons whose epoch is ``oldest`` (µs) or later.
         """
-        _sample(
-            self._knots,
-            self._epochs,
-            self._dts,
-            self._lasts,
-            rows,
-            times,
-            self._dt,
-            oldest,
-            positions,
-            known,
-        )
+        _sample(self._knots, self._heads, rows, times, self._dt, oldest, positions, known)
 
 
-@kernel(VOID, array(3), *[array(1, INT)] * 5, INT, INT, output(3), output(1, BOOL))
+@kernel(VOID, array(3), array(2, INT), *[array(1, INT)] * 2, INT, INT, output(3), output(1, BOOL))
 def _sample(
     knots: Array,
-    epochs: NDArray[np.int64],
-    dts: NDArray[np.int64],
-    lasts: NDArray[np.int64],
+    heads: NDArray[np.int64],
     rows: NDArray[np.int64],
     times: NDArray[np.int64],
     step: int,
@@ -266,14 +249,14 @@ def _sample(
 ) -> None:
     """Write ``HorizonTable._sample``.
 
-    The rows of ``knots`` (S, k, 9) have ``lasts`` + 1 knots, ``dts`` (µs) apart. ``step`` (µs) is
-    the time between two of the positions (M, n, 3).
+    ``heads`` (S, 3): epoch, dt (µs) and index of the last knot for each row of ``knots`` (S, k, 9). ``step``
+    (µs) is the time between two of the positions (M, n, 3).
     """
     for j in range(len(rows)):
         row = rows[j]
-        known[j] = row >= 0 and epochs[row] >= oldest
+        known[j] = row >= 0 and heads[row, 0] >= oldest
         if row >= 0:
-            elapsed = times[j % len(times)] - epochs[row]
-            _positions_of(knots[row], lasts[row], elapsed, step, dts[row], positions[j])
+            elapsed = times[j % len(times)] - heads[row, 0]
+            _positions_of(knots[row], heads[row, 2], elapsed, step, heads[row, 1], positions[j])
         else:
             positions[j] = 0.0

@@ -14,6 +14,7 @@ import gzip
 import zlib
 from collections.abc import Generator, Iterator
 from contextlib import closing
+from functools import lru_cache
 from io import BufferedIOBase, BufferedReader
 from pathlib import Path
 from struct import Struct
@@ -26,6 +27,7 @@ from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.stretch import Record, Stretch, leading_records
 from mavlink_bridge.wire.framing import (
     LONGEST_FRAME,
+    MAX_CACHED_BYTES,
     STARTS,
     Flaw,
     Frame,
@@ -111,23 +113,43 @@ class TlogWriter:
             raise LogError(f"time {time_us} µs, link {link}: not in a tlog's range")
         stamp = _STAMP.pack(time_us & ~3 | link)
         target = self._file if self._gzip is None else self._gzip
-        frames, at = leading_frames(data)
-        target.write(b"".join([self._record(stamp, frame) for frame in frames]))
+        # Several logs of one process may record the same datagram.
+        short = type(data) is bytes and len(data) <= MAX_CACHED_BYTES
+        frames, withheld, at = _leading(data) if short else _leading.__wrapped__(data)
+        target.write(stamp.join(frames))
+        self.records += len(frames) - 1
+        self.withheld += withheld
         while at < len(data):
             frame = frame_at(data, at)
             if isinstance(frame, Flaw) or not (frame.known or _is_frame_boundary(data, at + len(frame.data))):
                 at += 1
                 self.skipped_bytes += 1
                 continue
-            target.write(self._record(stamp, frame))
             at += len(frame.data)
+            recorded = _recorded(frame)
+            if recorded is None:
+                self.withheld += 1
+                continue
+            target.write(stamp + recorded)
+            self.records += 1
 
-    def _record(self, stamp: bytes, frame: Frame) -> bytes:
-        if frame.message_id == mavlink.MAVLINK_MSG_ID_SETUP_SIGNING:
-            self.withheld += 1
-            return b""
-        self.records += 1
-        return stamp + (without_signature(frame.data) if frame.signed else frame.data)
+
+def _recorded(frame: Frame) -> bytes | None:
+    """Return the bytes of a frame in a log, without a signature; None for SETUP_SIGNING."""
+    if frame.message_id == mavlink.MAVLINK_MSG_ID_SETUP_SIGNING:
+        return None
+    return without_signature(frame.data) if frame.signed else frame.data
+
+
+@lru_cache(maxsize=1024)
+def _leading(data: bytes) -> tuple[tuple[bytes, ...], int, int]:
+    """Return the ``leading_frames`` of ``data`` as recorded, after an empty one: a stamp precedes each frame.
+
+    Also returned are the number of frames that are left out, and where the frames end.
+    """
+    frames, at = leading_frames(data)
+    recorded = [part for frame in frames if (part := _recorded(frame)) is not None]
+    return (b"", *recorded), len(frames) - len(recorded), at
 
 
 def _is_frame_boundary(data: bytes, at: int) -> bool:

@@ -95,10 +95,8 @@ class Codec:
         accept, signing = self._accept, self._signing
         found: list[Message] = []
         for frame in self._framer.feed(data, whole=whole):
-            row = BY_ID.get(frame.message_id)
-            if row is None or (
-                accept is not None and not accept(frame.message_id, frame.system, frame.component)
-            ):
+            _, _, system, component, message_id, _, _, _, _ = frame
+            if message_id not in BY_ID or (accept is not None and not accept(message_id, system, component)):
                 self._filtered += 1
                 continue
             if signing is not None and signing.check(frame) is not None:

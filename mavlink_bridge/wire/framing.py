@@ -18,7 +18,8 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as mavlink
 
 _MARKERS = (mavlink.PROTOCOL_MARKER_V1, mavlink.PROTOCOL_MARKER_V2)
-_MAX_CACHED_BYTES = 512
+MAX_CACHED_BYTES = 512
+"""Length of the longest datagram whose frames are cached."""
 LONGEST_FRAME = 280  # version 2: 10 header, 255 payload, 2 checksum, 13 signature
 
 STARTS = re.compile(b"[\xfd\xfe]")
@@ -134,7 +135,7 @@ def leading_frames(data: bytes) -> tuple[tuple[Frame, ...], int]:
     and its frames depend only on its bytes.
     """
     # A bytearray may change, and may not be hashed.
-    short = type(data) is bytes and len(data) <= _MAX_CACHED_BYTES
+    short = type(data) is bytes and len(data) <= MAX_CACHED_BYTES
     return _leading(data) if short else _leading.__wrapped__(data)
 
 
@@ -222,7 +223,7 @@ class Framer:
         if self._rest:
             data = self._rest + data
         # As ``leading_frames``, without the call: every datagram passes here.
-        short = type(data) is bytes and len(data) <= _MAX_CACHED_BYTES
+        short = type(data) is bytes and len(data) <= MAX_CACHED_BYTES
         frames, at = _leading(data) if short else _leading.__wrapped__(data)
         if at == len(data):
             self._rest = b""

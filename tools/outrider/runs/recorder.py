@@ -38,4 +38,5 @@ class Recorder:
         """Write a datagram of ``node`` to its tlog."""
         writer = self._writers.get(node)
         if writer is not None:
-            writer.write(now, names.LINK_NUMBERS[datagram.link], datagram.data)
+            link, data = datagram
+            writer.write(now, names.LINK_NUMBERS[link], data)
