@@ -230,7 +230,7 @@ class HealthMonitor:
             for system in s.refused.differing
         ]
         clocks = [
-            Concern(f"peer clock {system}", f"Clock of {system} is wrong: its plans are refused")
+            Concern(f"peer clock {system}", f"Clock of {system} is wrong: no new plans")
             for system in s.refused.wrong_clock
         ]
         return doubled + foreign + differing + clocks
