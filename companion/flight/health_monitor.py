@@ -229,7 +229,11 @@ class HealthMonitor:
             Concern(f"differing {system}", f"{system} has another fleet file or settings")
             for system in s.refused.differing
         ]
-        return doubled + foreign + differing
+        clocks = [
+            Concern(f"peer clock {system}", f"Clock of {system} is wrong: no new plans")
+            for system in s.refused.wrong_clock
+        ]
+        return doubled + foreign + differing + clocks
 
     def _fence(self, s: HealthInputs) -> Concern | None:
         guard, own = self._config.guard, s.view.own

@@ -64,7 +64,10 @@ class CertifiedAvoidance:
 
     def refused(self, now: int) -> RefusedSenders:
         """Return the senders whose committed plans are refused at ``now`` (µs)."""
-        return self._flight.agreements.refused_senders(now)
+        agreements = self._flight.agreements
+        refused = agreements.refused_senders(now)
+        wrong = self._flight.clocks.wrong & agreements.members
+        return refused._replace(wrong_clock=tuple(sorted(wrong.union(refused.wrong_clock))))
 
     def shed(self) -> None:
         """Do nothing: the log is empty."""

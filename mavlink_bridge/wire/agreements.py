@@ -57,7 +57,8 @@ class Statement(NamedTuple):
     ``fingerprint``: 32 bits of the settings that the fleet has in common. ``epoch`` (µs): epoch of the
     sender's newest plan. ``since`` (µs): epoch of the first plan since which each plan began on the one
     before; agreements on an older plan of the sender are void. ``farewell``: the plan of ``epoch`` is the
-    sender's last. ``away``: the sender's vehicle is flown by another controller, and need not keep to its
+    sender's last before another ``since``; the entries' ``considered`` name the newest plans of the peers
+    that it holds. ``away``: the sender's vehicle is flown by another controller, and need not keep to its
     plan.
     """
 

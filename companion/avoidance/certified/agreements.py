@@ -9,7 +9,7 @@ agreement before it has begun anew.
 from __future__ import annotations
 
 from companion.avoidance.certified.fingerprint import FleetIdentity
-from companion.avoidance.certified.negotiation import AgreedPlans, Keeps, Negotiation
+from companion.avoidance.certified.negotiation import AgreedPlans, Geometry, Negotiation
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan, read, stored
@@ -22,28 +22,34 @@ from mavlink_bridge.wire.plan import WirePlan
 
 _OLDEST, _AHEAD = 12, 4
 """Largest time (epochs) by which a received plan may begin before now, and after."""
-_FOREIGN_US = 5_000_000
-"""Time (µs) after a message of another fleet during which nothing of its sender is accepted."""
+_REPORTED_US = 5_000_000
+"""Time (µs) after a message of another fleet, or of a wrong clock, during which its sender is reported.
+
+Nothing of a sender of another fleet is accepted in this time.
+"""
 
 
 class Agreements:
     """Agreements of the vehicle ``own`` (system id) in a ``fleet``.
 
     ``steps``: number of knots of every plan. ``since``: epoch (µs) of the first plan since which each own
-    plan began on the one before. ``refused`` counts the messages that were not accepted.
+    plan began on the one before; it changes when the vehicle returns, not at its farewell. ``refused`` counts
+    the messages that were not accepted.
     """
 
     def __init__(
-        self, own: int, config: CertifiedConfig, steps: int, fleet: FleetIdentity, keeps: Keeps
+        self, own: int, config: CertifiedConfig, steps: int, fleet: FleetIdentity, geometry: Geometry
     ) -> None:
         self._own, self._config, self._steps, self._fleet = own, config, steps, fleet
         self._plans = PlanFile()
-        self._negotiation = Negotiation(self._plans, steps, keeps)
+        self._negotiation = Negotiation(self._plans, steps, geometry)
         self._peers = {system: Peer(own, system) for system in set(config.fleet) - {own}}
         self._members: frozenset[int] | None = None
         self._foreign: dict[int, int] = {}
         self._other_knots: dict[int, int] = {}
         self._differing: dict[int, int] = {}
+        self._early: dict[int, int] = {}
+        self._farewell: int | None = None
         self.since = self.refused = 0
 
     def receive_plan(self, now: int, system: int, payload: bytes) -> None:
@@ -86,7 +92,14 @@ class Agreements:
         if plan.dt != self._config.dt_us or len(plan.accelerations) != self._steps or plan.epoch % epoch:
             self._other_knots[system] = now
             return False
-        return -_OLDEST * epoch <= plan.epoch - now <= _AHEAD * epoch
+        return -_OLDEST * epoch <= plan.epoch - now and self._begun(now, system, plan.epoch)
+
+    def _begun(self, now: int, system: int, epoch: int) -> bool:
+        """Return whether a sender whose clock is right can have sent this ``epoch`` (µs) by now."""
+        if epoch - now <= _AHEAD * self._config.epoch_us:
+            return True
+        self._early[system] = now
+        return False
 
     def receive_statement(self, now: int, system: int, statement: Statement) -> None:
         """Receive a statement of ``system``; refuse one of another fleet, or of a clock that is ahead."""
@@ -94,9 +107,9 @@ class Agreements:
             return
         if statement.fingerprint != self.fingerprint:
             self._refuse_fleet(now, system)
-        elif statement.epoch - now > _AHEAD * self._config.epoch_us:
+        elif not self._begun(now, system, max(statement.epoch, statement.since)):
             self.refused += 1
-        elif self._known(system).receive(now, statement):
+        elif self._known(system).receive(now, statement, self.since if self._farewell is None else 0):
             self._members = None
 
     def _refuse_fleet(self, now: int, system: int) -> None:
@@ -128,16 +141,26 @@ class Agreements:
 
     def begin(self, since: int) -> None:
         """Discard all agreements: the own plan of ``since`` (µs) does not begin on the one before."""
-        self.since = since
+        self.since, self._farewell = since, None
         self._plans.clear()
         for peer in self._peers.values():
-            peer.void()
+            peer.begin()
 
     def leave(self, epoch: int) -> None:
-        """Discard all agreements after the own farewell with the own plan of ``epoch`` (µs)."""
-        self.since = epoch + self._config.epoch_us
+        """Discard all agreements, and the others' farewells, at the own farewell with the plan of ``epoch``.
+
+        What others do until the own return may not be received, so each of them must be heard anew then.
+        """
+        self._farewell, self._members = epoch, None
         for peer in self._peers.values():
-            peer.void()
+            peer.leave(epoch)
+
+    def rejoin(self) -> None:
+        """Begin anew with the first plan after the own farewell; without a farewell do nothing."""
+        if self._farewell is not None:
+            self.since, self._farewell = self._farewell + self._config.epoch_us, None
+            for peer in self._peers.values():
+                peer.begin()
 
     def made(self, plan: WirePlan) -> bool:
         """File the own newest plan, which keeps all agreements of the lists; return whether it is new."""
@@ -150,7 +173,7 @@ class Agreements:
     def update(self, now: int) -> None:
         """Take, propose and refuse agreements, with the own newest plan."""
         newest = self._plans.newest
-        if newest is None or newest.plan.epoch < self.since:
+        if newest is None or newest.plan.epoch < self.since or self._farewell is not None:
             return
         for peer in self._peers.values():
             if peer.left is None and peer.stated and peer.plans.newest is not None and not peer.doubted(now):
@@ -193,10 +216,12 @@ class Agreements:
     def outdated(self, now: int, epoch: int) -> bool:
         """Return whether an agreement on the plans of ``epoch`` (µs) may soon replace an older one.
 
-        Vehicles from which nothing was received for ``gone_us`` are not counted.
+        Vehicles that another controller flies, and those from which nothing was received for ``gone_us``, are
+        not counted.
         """
         return any(
             peer.left is None
+            and not peer.away
             and peer.last_received is not None
             and now - peer.last_received <= self._config.gone_us
             and not self._negotiation.current(peer, epoch)
@@ -249,9 +274,10 @@ class Agreements:
         foreign = _recent(self._foreign, now)
         differing = (_recent(self._differing, now) | _recent(self._other_knots, now)) - foreign
         doubled = {system for system, peer in self._peers.items() if peer.doubted(now)} - foreign - differing
-        return RefusedSenders(*(tuple(sorted(found)) for found in (doubled, foreign, differing)))
+        early = _recent(self._early, now)
+        return RefusedSenders(*(tuple(sorted(found)) for found in (doubled, foreign, differing, early)))
 
 
 def _recent(times: dict[int, int], now: int) -> set[int]:
-    """Return the systems whose time is less than ``_FOREIGN_US`` before ``now`` (µs)."""
-    return {system for system, time in times.items() if now - time < _FOREIGN_US}
+    """Return the systems whose time is less than ``_REPORTED_US`` before ``now`` (µs)."""
+    return {system for system, time in times.items() if now - time < _REPORTED_US}

@@ -74,9 +74,12 @@ class Commitment:
 
     def begin(self, now: int, position: Array) -> int:
         """Hold ``position`` (3,), m; return the epoch (µs) of the plan to announce, the first unannounced."""
-        epoch, steps = self.epoch(now), self._program.n
+        epoch, steps, length = self.epoch(now), self._program.n, self._config.epoch_us
         self.current = resting(epoch, self._config.dt_us, steps, position, self._origin)
-        free = max(epoch, self.announced_until) + self._config.epoch_us
+        free = max(epoch, self.announced_until) + length
+        if not self.announced_until:
+            # Before a restart the companion may have announced the plan of its next epoch, by a clock ahead.
+            free = self.epoch(now + 2 * self._config.clock_us) + 2 * length
         self.following = self.current._replace(epoch=free)
         return free
 

@@ -10,8 +10,9 @@ from companion.avoidance.certified.commitment import Commitment, HoldReason
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.fingerprint import identity
+from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.qp import Objective, SeparationQp
-from companion.avoidance.certified.separating_planes import keeps
+from companion.avoidance.certified.separating_planes import apart, keeps
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
@@ -42,13 +43,17 @@ class CertifiedFlight:
             certified, program, self._deadlock_turn, fleet.fingerprint, planar=config.planar
         )
         self._sources = ConstraintSources(config, steps)
-        distance, planar = np.full((1, steps + 1), self._sources.between), config.planar
+        between, planar = self._sources.between, config.planar
+        distance = np.full((1, steps + 1), between)
         self.agreements = Agreements(
             own.system,
             certified,
             steps,
             identity(config, fleet),
-            lambda newest, one, other: keeps(newest, one, other, distance, upright=planar),
+            Geometry(
+                lambda newest, one, other: keeps(newest, one, other, distance, upright=planar),
+                lambda one, other: apart(one, other, between, upright=planar),
+            ),
         )
         self.clocks = ClockWatch(own, certified.clock_us)
         self._replies: list[Timesync] = []
@@ -91,6 +96,7 @@ class CertifiedFlight:
         counts this if a plan had been announced.
         """
         self._polled_at = now
+        self.agreements.rejoin()
         commitment, horizon = self.commitment, self.commitment.horizon()
         if horizon is not None:
             difference = horizon.at(now).position - position
@@ -111,6 +117,7 @@ class CertifiedFlight:
         call (``Commitment.last_call``).
         """
         self._polled_at, self._in_control = now, True
+        self.agreements.rejoin()
         turned = self.commitment.turn(now)
         self._agree(now)
         if not turned:
@@ -232,8 +239,8 @@ class CertifiedFlight:
         if not self._participated or now < self._next_announcement:
             return []
         self._next_announcement = now + self._config.certified.repeat_us
-        epoch, since = self.commitment.epoch(now), self.agreements.since
-        statement = Statement(self.agreements.fingerprint, epoch, since, away=True)
+        epoch = max(self.commitment.epoch(now), self.commitment.announced_until)
+        statement = Statement(self.agreements.fingerprint, epoch, self.agreements.since, away=True)
         return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(statement))]
 
     def _repeated(self) -> list[WirePlan]:

@@ -23,11 +23,16 @@ _OVERDUE = 0.5
 _LATE_US = 2_000_000
 """Age (µs) from which on a plan of an offer that has not been received is not expected any more."""
 
-Keeps = Callable[[Array, Array, Array], bool]
-"""Whether the newest own plan keeps the own side of the planes of a pair of plans, the own and the other.
 
-All are control points (n + 1, 3, 3), m, on the same knots.
-"""
+class Geometry(NamedTuple):
+    """Tests of plans, which are control points (n + 1, 3, 3), m, on the same knots.
+
+    ``keeps``: whether the first plan keeps the own side of the planes of a pair of plans, the own and the
+    other. ``apart``: whether two plans are the least distance apart.
+    """
+
+    keeps: Callable[[Array, Array, Array], bool]
+    apart: Callable[[Array, Array], bool]
 
 
 class AgreedPlans(NamedTuple):
@@ -40,8 +45,8 @@ class AgreedPlans(NamedTuple):
 class Negotiation:
     """Negotiation of one vehicle with each of its peers; ``plans``: its own, of ``steps`` knots each."""
 
-    def __init__(self, plans: PlanFile, steps: int, keeps: Keeps) -> None:
-        self._plans, self._steps, self._keeps = plans, steps, keeps
+    def __init__(self, plans: PlanFile, steps: int, geometry: Geometry) -> None:
+        self._plans, self._steps, self._geometry = plans, steps, geometry
 
     def advance(self, now: int, peer: Peer, newest: StoredPlan, since: int) -> None:
         """Take an offer of ``peer`` that the ``newest`` own plan keeps, or propose or refuse one.
@@ -49,6 +54,7 @@ class Negotiation:
         Offers on own plans of before ``since`` (µs) are void.
         """
         pair, epoch = peer.pair, newest.plan.epoch
+        peer.contradicted &= pair.confirmed is None
         refused = None
         for one in pair.offers:
             if one.epoch > epoch or one.own < since or not pair.may_take(one):
@@ -58,7 +64,7 @@ class Negotiation:
                 if epoch - min(one) > _LATE_US:
                     refused = refused or one
                 continue
-            if self._taken_in_time(newest, one, plans):
+            if self._taken_in_time(newest, one, plans) and self._unambiguous(peer, plans, one.epoch):
                 pair.take(one)
                 peer.changed = True
                 break
@@ -120,12 +126,22 @@ class Negotiation:
         planes between two near plans would keep only their distance.
         """
         confirmed = peer.pair.confirmed
+        epoch = plans.own.plan.epoch
         if confirmed is None:
-            return True
+            return self._unambiguous(peer, plans, epoch)
         before = self.plans_of(peer, confirmed)
-        return before is not None and self._kept(
-            plans.other, AgreedPlans(before.other, before.own), plans.own.plan.epoch
-        )
+        return before is not None and self._kept(plans.other, AgreedPlans(before.other, before.own), epoch)
+
+    def _unambiguous(self, peer: Peer, plans: AgreedPlans, epoch: int) -> bool:
+        """Return whether two plans may be the first ones agreed on, if the peer has contradicted itself.
+
+        Then nothing is known of the peer's plan but the plan itself: it must be the least distance from the
+        own one from ``epoch`` (µs) on.
+        """
+        if not peer.contradicted:
+            return True
+        rows = self._steps + 1
+        return self._geometry.apart(plans.own.later(epoch, rows), plans.other.later(epoch, rows))
 
     def _same(self, before: AgreedPlans, after: AgreedPlans) -> bool:
         """Return whether both plans of an agreement are the earlier ones, carried on."""
@@ -142,4 +158,4 @@ class Negotiation:
         all rest in the last of the n + 1 segments.
         """
         rows = self._steps + 1
-        return self._keeps(*(one.later(epoch, rows) for one in (plan, *plans)))
+        return self._geometry.keeps(*(one.later(epoch, rows) for one in (plan, *plans)))

@@ -21,9 +21,11 @@ class Peer:
     """State of the peer ``system`` as the vehicle ``own`` knows it.
 
     ``names``: the vehicles of its entries, and whether it has accepted their farewells. ``left``: the last
-    plan of a peer that said farewell. ``away``: another controller flies it. ``last_received``: time (µs) of
-    its last plan or statement. ``round_trip`` (µs): from a proposal to its answer. ``changed``: the entry
-    about it has changed since it was last stated.
+    plan of a peer whose farewell is accepted. ``departed``: so it is, or was until an own farewell that still
+    lasts, with no later plan or statement of it. ``away``: another
+    controller flies it. ``contradicted``: it has sent two plans of one epoch, and no agreement was confirmed
+    since. ``last_received``: time (µs) of its last plan or statement. ``round_trip`` (µs): from a proposal to
+    its answer. ``changed``: the entry about it has changed since it was last stated.
     """
 
     def __init__(self, own: int, system: int) -> None:
@@ -31,7 +33,7 @@ class Peer:
         self.plans, self.pair = PlanFile(), Pair(own, system)
         self.names: dict[int, bool] = {}
         self.left: StoredPlan | None = None
-        self.away = False
+        self.departed = self.away = self.contradicted = False
         self.last_received: int | None = None
         self.last_payload = b""
         self.round_trip = _ROUND_TRIP_US
@@ -63,7 +65,7 @@ class Peer:
         The own plan keeps the agreements until there is a new one, because without an agreement it is carried
         on.
         """
-        self._conflict = now
+        self._conflict, self.contradicted = now, True
         self.void()
 
     @property
@@ -77,13 +79,19 @@ class Peer:
             return
         last = self.left.plan
         if carried_on(last, (plan.plan.epoch - last.epoch) // last.dt) != plan.plan:
-            self.left = None
+            self._return()
 
-    def receive(self, now: int, statement: Statement) -> bool:
+    def _return(self) -> None:
+        self.left, self.departed = None, False
+
+    def receive(self, now: int, statement: Statement, since: int) -> bool:
         """Receive a statement of the peer; return whether names, farewell or return have changed.
 
-        A farewell means that the peer's plan of that epoch is its last. It is accepted with this plan, and if
-        no newer plan is known, once this plan has begun. It is repeated for receivers without this plan.
+        ``since`` (µs): epoch of the first own plan since the own last beginning; 0 before it, and during
+        an own farewell: then no farewell is accepted.
+        A farewell means that the peer's plan of that epoch is its last. It is accepted with this plan once
+        this plan has begun, if no newer plan is known, and if its sender has considered an own plan of
+        ``since`` or later. It is repeated for receivers of which this is not true yet.
         """
         known = self.pair.kept, self.pair.considered
         if self.left is None and self._seen.get(statement) == known:
@@ -97,11 +105,16 @@ class Peer:
         if self.left is not None:
             if statement.epoch <= self.left.plan.epoch:
                 return changed
-            if not statement.farewell:
-                self.left, changed = None, True
+            if not statement.farewell or statement.since > self.left.plan.epoch:
+                # It has returned; a farewell of the same departure has the same ``since``.
+                self._return()
+                changed = True
+        elif not statement.farewell:
+            self.departed = False
         self.last_received = now
         if statement.farewell:
-            return (statement.epoch <= now and self._part(statement.epoch)) or changed
+            accepted = statement.epoch <= now and self._answers(statement, since)
+            return (accepted and self._part(statement.epoch)) or changed
         for entry in statement.entries:
             if entry.peer == self._own:
                 self.changed |= self.pair.receive(statement.epoch, statement.since, entry)
@@ -120,14 +133,37 @@ class Peer:
         self.names.update({one.peer: one.departed for one in statement.entries if one.peer != self._own})
         return self.names != before
 
+    def begin(self) -> None:
+        """Discard the agreements, because the own plan begins anew; also after an own farewell."""
+        self.void()
+        self.departed = self.left is not None
+
+    def _answers(self, farewell: Statement, since: int) -> bool:
+        """Return whether the sender of ``farewell`` has considered an own plan of ``since`` (µs) or later.
+
+        Then it sent this farewell after the own last beginning, see docs/certified.md.
+        """
+        considered = (entry.considered[1] for entry in farewell.entries if entry.peer == self._own)
+        return since > 0 and any(epoch >= since for epoch in considered)
+
     def _part(self, epoch: int) -> bool:
         """Accept the farewell with the plan of ``epoch`` (µs) if no newer plan is known; return whether."""
         plan = self.plans.get(epoch)
         if plan is None or plan is not self.plans.newest:
             return False
-        self.left = plan
+        self.left, self.departed = plan, True
         self.void(epoch + 1)
         return True
+
+    def leave(self, epoch: int) -> None:
+        """Discard the agreements and the farewell of the peer, at an own farewell with the plan of ``epoch``.
+
+        The peer's newest plan counts as considered, so that the farewell answers it.
+        """
+        self.left = None
+        self.void()
+        if self.plans.newest is not None:
+            self.pair.refuse(Agreement(epoch, self.plans.newest.plan.epoch))
 
     def void(self, others_since: int = 0) -> None:
         """Discard all agreements with the peer, see ``Pair.void``."""
@@ -155,7 +191,7 @@ class Peer:
     def entry(self) -> Entry:
         """Return the entry to state about the peer, and count it as stated."""
         self.changed = False
-        return self.pair.entry(departed=self.left is not None)
+        return self.pair.entry(departed=self.departed)
 
     def needed(self) -> Iterable[int]:
         """Return the epochs (µs) of the own plans that agreements and offers name."""

@@ -79,6 +79,14 @@ def keeps(newest: Array, own: Array, other: Array, distance: Array, *, upright: 
     return bool((along(found.normals, newest) >= found.least).all())
 
 
+def apart(one: Array, two: Array, distance: float, *, upright: bool = False) -> bool:
+    """Return whether two plans, control points (n, 3, 3), m, are ``distance`` (m) apart at all times."""
+    relative = one - two
+    if upright:
+        relative[..., 2] = 0.0
+    return bool((hull_distance(relative) >= distance).all())
+
+
 def along(normals: Array, points: Array) -> Array:
     """Return c·q (M, n, 3), m, of control points (n, 3, 3), m, along the ``normals`` (M, n, 3).
 

@@ -122,6 +122,7 @@ LIMITS = {
     "a jump to nowhere": ("origin", {}, {"moves": 1, "displaced": math.nan}, TO_LAND),
     "plans in another frame": ("foreign", {}, {"refused": RefusedSenders(foreign=(12,))}, TELL),
     "another fleet file": ("differing", {}, {"refused": RefusedSenders(differing=(12,))}, TELL),
+    "a wrong clock": ("peer", {}, {"refused": RefusedSenders(wrong_clock=(12,))}, TELL),
     "two vehicles with an id": ("doubled", {}, {"refused": RefusedSenders(doubled=(12,))}, TELL),
     "who took it over": ("custody", {"phase": Phase.ESCORT}, {"phase": Phase.YIELDED}, TELL),
 }

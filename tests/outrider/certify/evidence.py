@@ -32,6 +32,7 @@ ABOUT_AGREEMENTS = frozenset(
         "a plan beyond agreed planes",
         "a plan without a statement",
         "a plan without an agreement",
+        "a return that is not stated",
         "a statement heard that its sender did not tell",
         "a statement of another fleet",
         "an agreement dropped",

@@ -279,17 +279,19 @@ def test_who_begins_anew_says_so() -> None:
     assert found(judge(anew(stated=False))) == [("a new beginning that is not stated", (12,))]
 
 
-def parting(*, farewell: bool, newest: bool = True) -> Evidence:
-    """12 says farewell with its plan of epoch 1, which is its newest or not; 11 makes plans without it."""
+def parting(*, farewell: bool = True, newest: bool = True, considered: int = BEGAN) -> Evidence:
+    """12 says farewell with its plan of epoch 1, which is its newest or not; 11 makes plans without it.
+
+    ``considered``: epoch of the plan of 11 that the farewell names.
+    """
     told = Told((11, 12), TERMS)
     plans = aside(A, 4)
     told.of_epoch({11: plans[:1], 12: [B]})
     told.of_epoch({11: [plans[1]], 12: [on(B)]})
     if not newest:
         told.plan(12, on(B, 2))
-    told.state(
-        12, Statement(TERMS.fleet_identity.fingerprint, at(1), at(2) if farewell else BEGAN, (), farewell)
-    )
+    entry = Entry(11, considered=(at(1), considered))
+    told.state(12, Statement(TERMS.fleet_identity.fingerprint, at(1), BEGAN, (entry,), farewell))
     for plan in plans[2:]:
         told.plan(11, plan)
         told.state(
@@ -299,9 +301,36 @@ def parting(*, farewell: bool, newest: bool = True) -> Evidence:
 
 
 def test_only_who_has_said_farewell_is_left_out() -> None:
-    assert judge(parting(farewell=True)).findings == ()
-    for verdict in (judge(parting(farewell=False)), judge(parting(farewell=True, newest=False))):
-        assert ("a departure without a farewell", (11, 12)) in found(verdict)
+    assert judge(parting()).findings == ()
+    for run in (parting(farewell=False), parting(newest=False), parting(considered=BEGAN - EPOCH)):
+        assert ("a departure without a farewell", (11, 12)) in found(judge(run))
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_who_returns_says_so_and_counts_on_no_farewell_of_before(stated: bool) -> None:
+    """11 has accepted the farewell of 12, says farewell, and makes plans beside the last plan of 12 anew."""
+    told = Told((11, 12), TERMS)
+    plans = aside(A, 5)
+    told.of_epoch({11: plans[:1], 12: [B]})
+    told.of_epoch({11: [plans[1]], 12: [on(B)]})
+    told.state(
+        12,
+        Statement(
+            TERMS.fleet_identity.fingerprint, at(1), BEGAN, (Entry(11, considered=(at(1), BEGAN)),), True
+        ),
+    )
+    departed = (Entry(12, departed=True),)
+    told.plan(11, plans[2])
+    told.state(11, Statement(TERMS.fleet_identity.fingerprint, at(2), BEGAN, departed))
+    told.state(11, Statement(TERMS.fleet_identity.fingerprint, at(2), BEGAN, departed, farewell=True))
+    for plan in plans[3:]:
+        told.plan(11, plan)
+        told.state(
+            11, Statement(TERMS.fleet_identity.fingerprint, plan.epoch, at(3) if stated else BEGAN, departed)
+        )
+    expected = ("a departure without a farewell", (11, 12)), ("a return that is not stated", (11,))
+    assert expected[not stated] in found(judge(told.evidence()))
+    assert expected[stated] not in found(judge(told.evidence()))
 
 
 # A plan is made with an agreement with each

@@ -6,10 +6,11 @@ records are gone through in their order, so a statement counts for those that fo
 - An agreement enters a list if it is newer than all that the list's statements have considered before, if
   both plans are known to the vehicle, and if its newest plan is not older than either.
 - It leaves by succession (a newer one of the list was stated by the peer), withdrawal (the peer has
-  considered it, or a newer one, and its list lacks it), void (one of the two began anew after its plan) or
-  the peer's farewell.
+  considered it, or a newer one, and its list lacks it), void (one of the two began anew after its plan, or
+  the owner has said farewell) or the peer's farewell.
 - A plan is made only if each peer that has not departed has stated an agreement of the list.
-- A vehicle that begins anew states this: ``since`` is later than its plans before.
+- A vehicle that begins anew, or returns, states this: ``since`` is later than its plans before.
+- A farewell is accepted only if its sender has considered a plan of the receiver's last beginning or later.
 """
 
 from __future__ import annotations
@@ -48,6 +49,8 @@ class _Peer:
         self._lacking: list[tuple[int, Epochs, frozenset[Epochs]]] = []
         """Received: epoch of the statement, the newest considered agreement, and the list."""
         self._plans: set[int] = set()
+        self._left = False
+        """Whether the owner has said farewell and has not begun anew."""
         self._farewell: int | None = None
         """Epoch of the last plan of a peer whose farewell was to be accepted."""
 
@@ -63,7 +66,12 @@ class _Peer:
         """Take note of a statement of the peer."""
         epoch = statement.epoch
         if statement.farewell:
-            if self._plans and epoch == max(self._plans):
+            answers = any(
+                entry.considered[1] >= self._own_since
+                for entry in statement.entries
+                if entry.peer == self._owner
+            )
+            if answers and self._plans and epoch == max(self._plans):
                 self._farewell, self._since = epoch, max(self._since, epoch + 1)
             return
         if self._farewell is not None and epoch > self._farewell:
@@ -81,6 +89,10 @@ class _Peer:
         """Take note of an own entry; yield kind and figures of what the rules forbid."""
         if statement.since > self._own_since:
             self._own_since, self._considered = statement.since, _NONE
+            if self._left:
+                # The farewells from before the own one do not count any more.
+                self._left, self._farewell = False, None
+        self._left |= statement.farewell
         before, now = set(self._listed), set(entry.agreements)
         for one in entry.agreements:
             if one not in before:
@@ -106,7 +118,7 @@ class _Peer:
             yield "an agreement on a plan newer than the own one", self._named(one)
 
     def _void(self, one: Epochs) -> bool:
-        return one[0] < self._own_since or one[1] < self._since
+        return self._left or one[0] < self._own_since or one[1] < self._since
 
     def _leaves(self, one: Epochs, entry: Entry) -> bool:
         rank = self._rank(one)
@@ -147,6 +159,7 @@ def listings(
         if step.kind in (Kind.FIRST, Kind.ANCHOR)
     }
     findings: list[Finding] = []
+    farewell: int | None = None
     records: list[LoggedPlan | LoggedStatement] = sorted(
         chain(log.sightings, log.statements), key=lambda record: record.number
     )
@@ -170,6 +183,12 @@ def listings(
             before = unsaid.pop(statement.epoch, None)
             if before is not None and statement.since <= before:
                 findings.append(Finding("a new beginning that is not stated", (owner,), statement.epoch, ""))
+            if statement.farewell:
+                farewell = statement.epoch
+            elif farewell is not None:
+                if statement.since <= farewell:
+                    findings.append(Finding("a return that is not stated", (owner,), statement.epoch, ""))
+                farewell = None
             for entry in statement.entries:
                 peer = peers.setdefault(entry.peer, _Peer(owner, entry.peer))
                 who = owner, peer.system

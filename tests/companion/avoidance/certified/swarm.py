@@ -44,7 +44,7 @@ def within(since: int, spans: tuple[tuple[int, int], ...]) -> bool:
 class Rough(NamedTuple):
     """How a channel treats messages: share lost, longest delay (µs), share sent twice; who is cut off from
     all others from when till when (µs of the run); who hears nothing; from when till when nobody hears whom,
-    or only its plans."""
+    or only its plans. ``again``: µs after which each message arrives once more, 0 for never."""
 
     loss: float = 0.0
     delay: int = 0
@@ -53,6 +53,7 @@ class Rough(NamedTuple):
     deaf: frozenset[int] = frozenset()
     mute: tuple[tuple[int, int, int], ...] = ()
     alone: tuple[tuple[int, int, int], ...] = ()
+    again: int = 0
 
 
 class Habits(NamedTuple):
@@ -138,8 +139,10 @@ class Vehicle:
         else:
             self._fly(now, since, goal)
         messages = flight.messages(now, farewell=leaving)
+        # Before its first plan, a companion that has restarted flies what the one before has told.
+        first = flight.agreements.since if self._restarted else 0
         for plan in (commitment.current, commitment.following):
-            if plan is not None and (self.plans or messages):
+            if plan is not None and plan.epoch >= first and (self.plans or messages):
                 self.contradictions += self.plans.setdefault(plan.epoch, plan) != plan
         return [message for message in messages if isinstance(message, Tunnel)]
 
@@ -273,6 +276,8 @@ class Swarm:
                 arrives = since + 1 + int(rng.random() * rough.delay)
                 if rng.random() >= rough.loss and not (cut or mute):
                     heappush(receiver.inbox, (arrives, next(self._serial), message))
+                    if rough.again:
+                        heappush(receiver.inbox, (arrives + rough.again, next(self._serial), message))
 
     def epochs(self) -> range:
         """All that anybody flew in."""

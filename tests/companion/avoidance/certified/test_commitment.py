@@ -238,15 +238,15 @@ class TestStanding:
             flight.stand(EPOCH, HERE)
             flight.due(EPOCH)
             assert len(tunnels(flight, EPOCH)) == 2
-            for now in range(EPOCH + 60_000, EPOCH + 3 * LENGTH, 60_000):
+            for now in range(EPOCH + 60_000, EPOCH + 4 * LENGTH, 60_000):
                 said = [one for one in flight.messages(now, farewell=leaving) if isinstance(one, Tunnel)]
                 told = unpack(said[-1].payload)
                 assert (len(said), told.away) == ((2, False) if leaving else (1, True))
-                if now >= EPOCH + LENGTH:
+                if now >= EPOCH + 2 * LENGTH:
                     assert told.farewell == leaving
             # Landed, and handed over: the farewell was the last that was heard of it.
-            assert bool(tunnels(flight, EPOCH + 4 * LENGTH)) != leaving
-            now = EPOCH + 5 * LENGTH
+            assert bool(tunnels(flight, EPOCH + 5 * LENGTH)) != leaving
+            now = EPOCH + 6 * LENGTH
             flight.stand(now, HERE)
             assert bool(tunnels(flight, now)) != leaving
             flight.due(now + 20_000)

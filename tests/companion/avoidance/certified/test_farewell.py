@@ -43,10 +43,11 @@ def at(place: Array) -> Callable[[int], Array]:
 
 
 def leave(flight: CertifiedFlight, end: Array) -> None:
-    """The other says farewell with a plan at rest at ``end`` (3,), m."""
+    """The other says farewell with a plan at rest at ``end`` (3,), m, and has received the own first plan."""
     agreements = flight.agreements
     agreements.receive_plan(EPOCH, LEFT, pack(resting(EPOCH, DT, STEPS, end, FLEET.fingerprint)))
-    farewell = Statement(fingerprint(CONFIG, FLEET), EPOCH, EPOCH, (Entry(OWN),), farewell=True)
+    entry = Entry(OWN, considered=(EPOCH, agreements.since))
+    farewell = Statement(fingerprint(CONFIG, FLEET), EPOCH, EPOCH, (entry,), farewell=True)
     agreements.receive_statement(EPOCH, LEFT, farewell)
     assert agreements.left.keys() == {LEFT}
 
@@ -55,8 +56,8 @@ def way(received: Callable[[int], Array | None], *, whom: int = LEFT, end: Array
     """Where the other flies (k, 3), every 20 ms, from 6 m before to 6 m behind the origin: one said farewell
     at ``end``, and ``whom`` is heard at ``heard`` by µs since, from 0.1 s before its last plan begins on."""
     flight, world = CertifiedFlight(CONFIG, Source(OWN, 195), FLEET), World(CONFIG, OWN, 0, FLEET)
-    leave(flight, end)
     flight.stand(EPOCH, np.array([-6.0, 0.0, 5.0]))
+    leave(flight, end)
     places = []
     for since in range(-100_000, 6_000_000, 20_000):
         now, place = EPOCH + since, received(since)
@@ -118,12 +119,12 @@ def test_who_was_carried_aside_after_landing_and_switched_off_keeps_nobody_away_
     end, goal = np.array([0.0, 12.0, 5.0]), np.array([6.0, 0.0, 5.0])
     place = end + np.array([0.0, off * LEAST, -5.0])
     flight, world = CertifiedFlight(CONFIG, Source(OWN, 195), FLEET), World(CONFIG, OWN, 0, FLEET)
+    flight.stand(EPOCH, np.array([-6.0, 0.0, 5.0]))
     leave(flight, end)
     for since in range(0, 1_000_000, 20_000):
         said = position_message(Source(LEFT, 195), 1_000_000 + since, FLEET, place, np.zeros(3), None)
         world.receive(EPOCH + since, "swarm", said)
     begin = EPOCH + 60_000_000
-    flight.stand(begin, np.array([-6.0, 0.0, 5.0]))
     for now in range(begin, begin + 8_000_000, 20_000):
         if flight.due(now):
             assert flight.plan(now, standing(goal), world, _NOTHING)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from heapq import heappop, heappush
 from itertools import count
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -67,6 +68,8 @@ class Fleet:
         ]
         self._delay, self._true = delay, START
         self._number = count()
+        self.forged: dict[int, Callable[[Timesync | Tunnel], Timesync | Tunnel]] = {}
+        """What the messages of a vehicle are replaced by."""
         self._air: list[tuple[int, int, int, Timesync | Tunnel]] = []
 
     def run(self, seconds: float, check: Callable[[Vehicle], None] = lambda _vehicle: None) -> Fleet:
@@ -84,7 +87,7 @@ class Fleet:
                 vehicle.jumps += vehicle.clock.step(vehicle.now, free=vehicle.free)
                 for message in vehicle.clock.messages(vehicle.now):
                     assert isinstance(message, Timesync | Tunnel)
-                    self._send(vehicle, message)
+                    self._send(vehicle, self.forged.get(vehicle.system, _as_it_is)(message))
                 check(vehicle)
         return self
 
@@ -93,6 +96,10 @@ class Fleet:
             delay = self._delay()
             if vehicle is not sender and delay is not None:
                 heappush(self._air, (self._true + delay, next(self._number), vehicle.system, message))
+
+
+def _as_it_is(message: Timesync | Tunnel) -> Timesync | Tunnel:
+    return message
 
 
 def within_bound(vehicle: Vehicle) -> None:
@@ -207,6 +214,33 @@ def test_differences_of_fleet_times_hold_the_true_ones() -> None:
     bounds = first.clock.differences(first.now)[2]
     assert bounds.least <= second.off - first.off <= bounds.most
     assert bounds.most - bounds.least <= 2 * BOUND
+
+
+@pytest.mark.parametrize("vehicles", [2, 3])
+def test_a_peer_that_lies_about_its_bound_misleads_nobody(vehicles: int) -> None:
+    """Beside one other source no time is believed, and plans are held; beside two it is left out."""
+    fleet = Fleet(*[(0, 0, True)] * vehicles).run(3.0)
+    for vehicle in fleet.vehicles:
+        vehicle.free = False
+    fleet.forged[1] = lambda message: (
+        Tunnel(message.source, 0, 0, PAYLOAD_TYPE, pack(lied(message)))
+        if isinstance(message, Tunnel)
+        else message
+    )
+    fleet.run(5.0, within_bound)
+    expected = TimeTrouble.DISAGREE if vehicles == 2 else None
+    assert {v.clock.trouble for v in fleet.vehicles[1:]} == {expected}
+    assert all(abs(v.off) <= BOUND for v in fleet.vehicles[1:])
+
+
+def lied(message: Tunnel) -> FleetTime:
+    """The fleet time of ``message`` with an estimate that is 5 s off, and said to be exact."""
+    told = unpack(message.payload)
+    return (
+        told
+        if told.estimate is None
+        else told._replace(estimate=Estimate(told.estimate.ahead + 5 * SECOND, 0))
+    )
 
 
 @given(

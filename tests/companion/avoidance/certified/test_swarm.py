@@ -8,10 +8,12 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from companion.avoidance.certified.committed import rests
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.draws import UNTIL, goals, starts, swarms
+from tests.companion.avoidance.certified.flights import fly
 from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.swarm import NEVER, Habits, Rough, Swarm
 
@@ -72,7 +74,6 @@ AWAY = [
 """Two that are away together. Each hears the other's farewell."""
 
 
-@pytest.mark.xfail(strict=True, reason="both farewells are accepted, and neither hears of the other's return")
 def test_two_that_were_away_together_and_do_not_hear_each_other_since_stay_apart() -> None:
     """From its return on nothing of 1 is heard, and from 1.45 s on it hears nothing."""
     rough = Rough(cuts=((1_450_000, NEVER, frozenset({1})),), mute=((1_300_000, NEVER, 1),))
@@ -89,6 +90,32 @@ def test_two_that_were_away_together_plan_again_once_they_hear_each_other() -> N
     assert not swarm.faults()
     for vehicle in swarm.vehicles:
         assert any(made.since > 3_000_000 for made in vehicle.made)
+
+
+def test_who_returns_and_hears_nobody_makes_no_plan() -> None:
+    """Not even if all others had left before: they may have returned."""
+    left = Habits(leaves=1_000_000, returns=4_000_000)
+    rough = Rough(cuts=((2_000_000, NEVER, frozenset({1})),))
+    swarm = Swarm(circle(2, 6.0), rough, [Habits(leaves=1_500_000, returns=2_500_000), left], 0)
+    swarm.run(6_000_000, lambda since, system: np.array([0.0, 0.0, 5.0]))
+    assert not [made for made in swarm.vehicles[0].made if made.since > 1_500_000]
+    assert not swarm.faults()
+
+
+def test_who_returns_flies_once_those_that_have_left_answer_it() -> None:
+    leaving = [Habits(leaves=1_500_000, returns=2_500_000), Habits(leaves=1_000_000)]
+    swarm = Swarm(circle(2, 6.0), Rough(0.5, 100_000), leaving, 0)
+    swarm.run(6_000_000, lambda since, system: np.array([-1.0, since / 4e6, 5.0]))
+    assert any(made.since > 2_500_000 and made.left for made in swarm.vehicles[0].made)
+    assert not swarm.faults()
+
+
+@FLIGHTS
+@given(st.integers(0, 2**16))
+def test_who_restarts_gives_no_epoch_a_second_plan(seed: int) -> None:
+    """At any time, and however soon; and all others are apart, also from it when it flies among them."""
+    swarm = fly(seed, "quick")
+    assert not swarm.faults()
 
 
 @FLIGHTS
