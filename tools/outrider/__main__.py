@@ -9,7 +9,7 @@ from typing import Final, cast
 import typer
 
 from outrider.commands.campaigns import gallery, paper, sweep
-from outrider.commands.flying import doctor, fly, sitl, swarm
+from outrider.commands.flying import doctor, fly, preflight, sitl, swarm
 from outrider.commands.machine import bench, key
 from outrider.commands.reading import export, replay, report, view
 from outrider.errors import InputError, OutriderError
@@ -41,7 +41,22 @@ def _root() -> None:
     """Make typer treat every command as a sub-command."""
 
 
-for _command in (swarm, view, sitl, doctor, fly, sweep, paper, gallery, replay, export, report, key, bench):
+for _command in (
+    swarm,
+    view,
+    sitl,
+    doctor,
+    preflight,
+    fly,
+    sweep,
+    paper,
+    gallery,
+    replay,
+    export,
+    report,
+    key,
+    bench,
+):
     app.command()(_command)
 
 

@@ -204,6 +204,41 @@ def doctor(
     raise typer.Exit(examining(endpoint, system, seconds, key, as_json))
 
 
+def preflight(
+    autopilot: Annotated[str, typer.Option(help="udpin:HOST:PORT, tcp:HOST:PORT, /dev/…,BAUD, ….")],
+    swarm: Annotated[str, typer.Option(help="Endpoint of the other companions.")],
+    config: Annotated[str, typer.Option(help="A file, or ardupilot, px4: that of the flight.")],
+    system: Annotated[
+        int | None,
+        typer.Option(min=1, max=250, help="In place of the file's system id; unique to each vehicle."),
+    ] = None,
+    roster: Annotated[
+        str | None, typer.Option(help="System ids of all vehicles, such as 1,2,3; by default the file's.")
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(min=5.0, max=3600.0, help="Duration of the measurement, s.")
+    ] = 20.0,
+    wait: Annotated[
+        float, typer.Option(min=1.0, max=86400.0, help="Longest time to wait for the others, s.")
+    ] = 120.0,
+    signing_key: SigningKey = None,
+    out: Annotated[Path, typer.Option(help="The fleet file; one that exists is replaced.")] = Path(
+        "fleet.yaml"
+    ),
+    as_json: AsJson = False,
+) -> None:
+    """Check a fleet before a certified flight, by one process on each companion, and write the fleet file.
+
+    It measures links, clocks and the accuracy of positions, and reads parameters; it arms and moves nothing.
+    Exits with 1 if a check fails (docs/preflight.md).
+    """
+    from outrider.preflight.command import Options
+    from outrider.preflight.command import preflight as checking
+
+    options = Options(autopilot, swarm, config, system, roster, seconds, wait, signing_key, out, as_json)
+    raise typer.Exit(checking(options))
+
+
 def fly(
     autopilot: Annotated[
         str,

@@ -15,6 +15,7 @@ from outrider.errors import InputError
 from outrider.fly.link_budget import doubts, doubts_of_autopilot
 from outrider.key_files import key_of
 from outrider.resources import find
+from outrider.scenarios.fleet_file import with_fleet_file
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.yaml_files.yaml_file import load
 
@@ -66,11 +67,13 @@ class Request:
 
 def checked(options: Options) -> Request:
     """Return the checked request. Raises InputError, which names the faulty option and allowed values."""
-    config = load(find("companions", options.config), FlyConfig)
+    place = find("companions", options.config)
+    config = load(place, FlyConfig)
     if options.system is not None:
         if options.system == config.target:
             raise InputError(f"--system {options.system}: is the target's; allowed: another's")
         config = config.model_copy(update={"system": options.system})
+    config = with_fleet_file(config, place)
     if options.dry_run and options.go:
         raise InputError("--go: does not go with --dry-run, in which nothing takes off")
     autopilot = _endpoint("autopilot", options.autopilot)

@@ -50,6 +50,12 @@ class FlyConfig(Settings):
     )
     target: int = Field(ge=1, le=255, description="system id of the target")
     origin: FleetOrigin
+    fleet: str | None = Field(
+        None,
+        max_length=4096,
+        description="fleet file that outrider preflight wrote, relative to this file; settings that this file"
+        " states must be the same there",
+    )
     takeoff_height: float = Field(5.0, ge=0.5, le=120.0, description="m above the ground, at the go")
     radio: Literal[57600] | None = Field(
         None, description="baud of a radio that eight vehicles share as the swarm link; null: a network"

@@ -1,0 +1,145 @@
+"""Messages between the checks before a certified flight, each in a TUNNEL.
+
+A *probe* has the size of a committed plan, so that a link is measured with messages as in flight. A *report*
+has what one vehicle has measured, in one or more parts.
+
+Sizes in bytes, little endian. Both: kind 1, run 4 (a random number of the sending process), fingerprint of
+the fleet's common settings 4. Probe: sequence number 4, time 7 (µs, the sender's clock), 0xFF up to 128.
+Report: flags 1 (bit 0: passed, bit 1: σ is known, bit 2: clock is known, bit 3: σ is fixed by the file, bit
+4: clock is fixed by the file), part 1, number of parts 1, autopilot 1 (MAV_AUTOPILOT), UTC 4 (s), σ 2 (mm),
+clock 4 (µs), then the links: peer 1, loss 2 (1/10 000), jitter 2 (0.1 ms), round trip 2 (0.1 ms; 65 535:
+unknown).
+"""
+
+from __future__ import annotations
+
+from struct import Struct
+from struct import error as StructError  # noqa: N812
+from typing import NamedTuple
+
+from mavlink_bridge.errors import PlanWireError
+
+PAYLOAD_TYPE = 0xDC06
+"""TUNNEL.payload_type; values above 32767 are free for private use."""
+PROBE, REPORT = 1, 2
+_SIZE = 128
+_PROBE = Struct("<BIII7s")
+_REPORT = Struct("<BIIBBBBIHI")
+_LINK = Struct("<BHHH")
+LINKS_PER_PART = (_SIZE - _REPORT.size) // _LINK.size
+"""Largest number of links in one part of a report."""
+_PASSED, _SIGMA, _CLOCK, _SIGMA_FIXED, _CLOCK_FIXED = 1, 2, 4, 8, 16
+_FLAGS = _PASSED | _SIGMA | _CLOCK | _SIGMA_FIXED | _CLOCK_FIXED
+MOST, UNKNOWN = 65_534, 65_535
+"""Largest value of two bytes that is a figure, and the value that says there is none."""
+
+
+class Probe(NamedTuple):
+    """Message ``sequence`` of the process ``run``, sent at ``time`` (µs, the sender's clock)."""
+
+    run: int
+    fingerprint: int
+    sequence: int
+    time: int
+
+
+class LinkReport(NamedTuple):
+    """Link from ``peer`` to the sender of the report: ``loss`` in 1/10 000; jitter and round trip in 0.1 ms.
+
+    ``round_trip``: None if no request was answered.
+    """
+
+    peer: int
+    loss: int
+    jitter: int
+    round_trip: int | None
+
+
+class Report(NamedTuple):
+    """What the process ``run`` has measured; this is ``part`` (0…) of ``parts``.
+
+    ``passed``: whether its vehicle passes. ``sigma`` (mm) and ``clock`` (µs): None if unknown; ``…_fixed``:
+    whether the vehicle's file states the setting. ``utc`` (s): time of the report.
+    """
+
+    run: int
+    fingerprint: int
+    passed: bool
+    sigma_fixed: bool
+    clock_fixed: bool
+    part: int
+    parts: int
+    autopilot: int
+    utc: int
+    sigma: int | None
+    clock: int | None
+    links: tuple[LinkReport, ...]
+
+
+def pack(message: Probe | Report) -> bytes:
+    """Encode ``message``; raise PlanWireError for a value that does not fit."""
+    try:
+        return _packed_probe(message) if isinstance(message, Probe) else _packed_report(message)
+    except (OverflowError, StructError):
+        raise PlanWireError(f"out of range of the wire: {message}") from None
+
+
+def _packed_probe(probe: Probe) -> bytes:
+    time = probe.time.to_bytes(7, "little")
+    data = _PROBE.pack(PROBE, probe.run, probe.fingerprint, probe.sequence, time)
+    return data.ljust(_SIZE, b"\xff")
+
+
+def _packed_report(report: Report) -> bytes:
+    if len(report.links) > LINKS_PER_PART or not report.part < report.parts:
+        raise PlanWireError(f"part {report.part} of {report.parts} with {len(report.links)} links")
+    flags = (
+        (_PASSED if report.passed else 0)
+        | (_SIGMA if report.sigma is not None else 0)
+        | (_CLOCK if report.clock is not None else 0)
+        | (_SIGMA_FIXED if report.sigma_fixed else 0)
+        | (_CLOCK_FIXED if report.clock_fixed else 0)
+    )
+    head = (REPORT, report.run, report.fingerprint, flags, report.part, report.parts, report.autopilot)
+    data = _REPORT.pack(*head, report.utc, report.sigma or 0, report.clock or 0)
+    for peer, loss, jitter, round_trip in report.links:
+        data += _LINK.pack(peer, loss, jitter, UNKNOWN if round_trip is None else round_trip)
+    return data
+
+
+def unpack(data: bytes) -> Probe | Report:
+    """Decode a probe or a report; raise PlanWireError for anything that ``pack`` cannot produce."""
+    if len(data) == _SIZE and data[0] == PROBE and not data[_PROBE.size :].strip(b"\xff"):
+        _, run, fingerprint, sequence, time = _PROBE.unpack_from(data)
+        return Probe(run, fingerprint, sequence, int.from_bytes(time, "little"))
+    size = len(data) - _REPORT.size
+    if not 0 <= size <= _SIZE - _REPORT.size or size % _LINK.size or data[0] != REPORT:
+        raise PlanWireError(f"{len(data)} bytes are no message of a check before a flight")
+    _, run, fingerprint, flags, part, parts, autopilot, utc, sigma, clock = _REPORT.unpack_from(data)
+    links = tuple(
+        LinkReport(peer, loss, jitter, None if round_trip == UNKNOWN else round_trip)
+        for peer, loss, jitter, round_trip in _LINK.iter_unpack(data[_REPORT.size :])
+    )
+    known = flags & _SIGMA, flags & _CLOCK
+    if (
+        flags & ~_FLAGS
+        or not part < parts
+        or any(v and not k for v, k in zip((sigma, clock), known, strict=True))
+    ):
+        raise PlanWireError(f"a report with flags {flags}, part {part} of {parts} is not valid")
+    if any(not link.peer or link.loss > 10_000 for link in links):
+        raise PlanWireError("a report on a link that cannot be")
+    return Report(
+        run,
+        fingerprint,
+        bool(flags & _PASSED),
+        bool(flags & _SIGMA_FIXED),
+        bool(flags & _CLOCK_FIXED),
+        part,
+        parts,
+        autopilot,
+        utc,
+        sigma if known[0] else None,
+        clock if known[1] else None,
+        links,
+    )

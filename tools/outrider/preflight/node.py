@@ -1,0 +1,314 @@
+"""Node of the check beside one vehicle: it waits for all, measures, and exchanges reports.
+
+It commands nothing: it requests messages and parameters of the autopilot, and sends probes, reports and
+TIMESYNC to the other companions. No socket and no clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from companion.avoidance.certified.fingerprint import fingerprint
+from companion.config import CompanionConfig
+from companion.values.components import COMPONENT
+from mavlink_bridge.clocks.system_clock import SystemClock
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.messages import Message, Source, SystemTime, Timesync, Tunnel
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.fleet_time import PAYLOAD_TYPE as FLEET_TIME
+from mavlink_bridge.wire.preflight import LINKS_PER_PART, PAYLOAD_TYPE, Probe, Report, pack, unpack
+from mavlink_bridge.wire.signing import Signing
+from outrider.preflight.autopilot import RECEIVED, AutopilotFigures
+from outrider.preflight.clock_meter import ClockMeter
+from outrider.preflight.findings import Check, Result, Verdict
+from outrider.preflight.judgement import judge
+from outrider.preflight.link_meter import LinkMeter
+from outrider.preflight.own_checks import CLOCK, SIGMA, own_checks
+from outrider.scenarios.fleet_file import stated_at
+from outrider.scenarios.fly_config import FleetOrigin
+
+_REPORT_US: Final = 200_000
+"""Time between two transmissions of the own report, µs."""
+_LINGER_US: Final = 3_000_000
+"""Time (µs) for which the own report is sent on when all reports were received."""
+_EXCHANGE_US: Final = 30_000_000
+"""Largest time (µs) of the exchange: the others may have begun later."""
+_CLOCK_PATIENCE_US: Final = 20_000_000
+"""Time (µs) from the first step for which the measurement waits for fleet time."""
+_NS_PER_US: Final = 1000
+_MOST_RUNS: Final = 1_000
+_SWARM_IDS: Final = (mavlink.MAVLINK_MSG_ID_TUNNEL, mavlink.MAVLINK_MSG_ID_TIMESYNC)
+
+
+class Phase(Enum):
+    """Phase of the check."""
+
+    WAIT = "waiting"
+    MEASURE = "measuring"
+    EXCHANGE = "exchanging reports"
+    OVER = "done"
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Terms of a check: ``config`` has the roster as ``certified.fleet``.
+
+    ``seconds``: duration of the measurement; ``wait_s``: longest time to wait for the others. ``run``: random
+    number (32 bits) of this process.
+    """
+
+    system: int
+    config: CompanionConfig
+    origin: FleetOrigin
+    seconds: float
+    wait_s: float
+    run: int
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """System ids of the others, sorted."""
+        return tuple(sorted(set(self.config.certified.fleet) - {self.system}))
+
+
+class Preflight:
+    """The check of one vehicle, a ``Node`` with the links ``autopilot`` and ``swarm``.
+
+    ``system_clock`` is a source of fleet time where it is measured. The times of ``step`` must be UTC with
+    ``signing``, and should be without: reports are dated by them.
+    """
+
+    def __init__(
+        self, terms: Terms, signing: Signing | None = None, system_clock: SystemClock | None = None
+    ) -> None:
+        self.name = f"preflight-{terms.system}"
+        self._terms, self._signing = terms, signing
+        self._own = own = Source(terms.system, COMPONENT)
+        config = terms.config
+        self._fingerprint = fingerprint(config, terms.origin.frame)
+        self._codecs = {
+            "autopilot": Codec(
+                lambda identifier, sender, component: (
+                    sender == own.system
+                    and component == mavlink.MAV_COMP_ID_AUTOPILOT1
+                    and identifier in RECEIVED
+                ),
+                signing,
+            ),
+            "swarm": Codec(
+                lambda identifier, _sender, component: component == COMPONENT and identifier in _SWARM_IDS,
+                signing,
+            ),
+        }
+        certified = config.certified
+        utc = certified.fleet_time == "measured" and certified.time_sources.autopilot_us is not None
+        self.autopilot = AutopilotFigures(own, planar=config.planar, utc=utc)
+        self.clock = ClockMeter(certified, own, system_clock)
+        # Plan and statement take two messages in ``repeat_us``.
+        self._period = max(certified.repeat_us // 2, 4)
+        self.meters = {system: LinkMeter(self._period) for system in terms.others}
+        self.phase = Phase.WAIT
+        self._began: int | None = None
+        self._phase_began = self._now = 0
+        self._sequence = self._next_probe = self._next_report = 0
+        self._doubled = False
+        self._checks: tuple[Check, ...] = ()
+        self._parts: list[Report] = []
+        self._received: dict[int, dict[int, Report]] = {}
+        self._complete_at: int | None = None
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Receive, measure, and return what is due at ``now`` (µs)."""
+        if self._began is None:
+            self._began = self._phase_began = now
+        self._now = now
+        if self._signing is not None:
+            self._signing.present(now)
+        for link, data in inbox:
+            for message in self._codecs[link].feed(data, whole=True):
+                self._receive(now, link, message)
+        self.autopilot.tick(now)
+        self.clock.tick(now)
+        self._advance(now)
+        found = {
+            "autopilot": [*self.autopilot.requests(now), *self.clock.to_autopilot(now)],
+            "swarm": [*self.clock.to_swarm(now), *self._due(now)],
+        }
+        return [
+            Datagram(link, self._codecs[link].encode(message))
+            for link, messages in found.items()
+            for message in messages
+        ]
+
+    def _receive(self, now: int, link: str, message: Message) -> None:
+        if link == "autopilot":
+            self.autopilot.receive(now, message)
+            if isinstance(message, SystemTime | Timesync):
+                self.clock.receive(now, link, message)
+            return
+        system = message.source.system
+        if isinstance(message, Tunnel) and message.payload_type == PAYLOAD_TYPE:
+            self._receive_tunnel(now, system, message.payload)
+        elif system != self._own.system and isinstance(message, Timesync):
+            self.clock.receive(now, link, message)
+            asked, asker = divmod(message.ts1, _NS_PER_US)
+            if message.tc1 > 0 and asker == self._own.system and system in self.meters and asked <= now:
+                self.meters[system].add_round_trip(now - asked)
+        elif isinstance(message, Tunnel) and message.payload_type == FLEET_TIME:
+            self.clock.receive(now, link, message)
+
+    def _receive_tunnel(self, now: int, system: int, payload: bytes) -> None:
+        try:
+            message = unpack(payload)
+        except PlanWireError:
+            return
+        if system == self._own.system:
+            # A multicast link returns the own messages.
+            self._doubled |= message.run != self._terms.run
+        elif system in self.meters:
+            if isinstance(message, Probe):
+                self.meters[system].receive(now, message)
+            elif message.fingerprint == self._fingerprint:
+                known = self._received.setdefault(system, {})
+                if any(part.run != message.run or part.parts != message.parts for part in known.values()):
+                    known.clear()
+                known[message.part] = message
+
+    def _advance(self, now: int) -> None:
+        terms, passed = self._terms, now - self._phase_began
+        if self.phase is Phase.WAIT:
+            if not self._lacking(now) or passed >= 1e6 * terms.wait_s or self._doubled:
+                self._begin(now, Phase.MEASURE)
+                self.autopilot.begin()
+                self.clock.begin()
+                for meter in self.meters.values():
+                    meter.begin()
+        elif self.phase is Phase.MEASURE:
+            if passed >= 1e6 * terms.seconds:
+                self._begin(now, Phase.EXCHANGE)
+                self._report(now)
+        elif self.phase is Phase.EXCHANGE:
+            if self._complete_at is None and not self._awaited():
+                self._complete_at = now
+            lingered = self._complete_at is not None and now - self._complete_at >= _LINGER_US
+            if lingered or passed >= _EXCHANGE_US:
+                self._begin(now, Phase.OVER)
+
+    def _begin(self, now: int, phase: Phase) -> None:
+        self.phase, self._phase_began = phase, now
+
+    def _lacking(self, now: int) -> str:
+        """Return what the measurement waits for, or an empty string."""
+        if lacking := self.autopilot.lacking(now):
+            return lacking
+        silent = [system for system, meter in self.meters.items() if not meter.heard(now)]
+        if silent:
+            return f"preflight of vehicle{'s' * (len(silent) > 1)} {', '.join(map(str, silent))}"
+        late = self._began is not None and now - self._began > _CLOCK_PATIENCE_US
+        return "" if late or self.clock.ready(now) else "fleet time"
+
+    def _report(self, now: int) -> None:
+        """Check the own vehicle, and make the report that is sent from now on."""
+        terms, autopilot, clock = self._terms, self.autopilot, self.clock.bound
+        self._checks = tuple(own_checks(terms.system, terms.config, autopilot, clock, doubled=self._doubled))
+        figures = [meter.figure(now).report(system) for system, meter in self.meters.items()]
+        groups = [figures[k : k + LINKS_PER_PART] for k in range(0, len(figures), LINKS_PER_PART)]
+        profile = autopilot.profile
+        passed = all(check.result is not Result.FAIL for check in self._checks)
+        self._parts = [
+            Report(
+                terms.run,
+                self._fingerprint,
+                passed,
+                bool(stated_at(terms.config, SIGMA)),
+                bool(stated_at(terms.config, CLOCK)),
+                part,
+                len(groups),
+                0 if profile is None else profile.autopilot,
+                now // 1_000_000,
+                None if autopilot.sigma is None else min(-int(-1e3 * autopilot.sigma // 1), 65_535),
+                None if clock is None else min(clock, 0xFFFFFFFF),
+                tuple(group),
+            )
+            for part, group in enumerate(groups)
+        ]
+
+    def _due(self, now: int) -> list[Message]:
+        """Return the probe and the own report, as far as they are due."""
+        found: list[Message] = []
+        if now >= self._next_probe:
+            self._next_probe = now + self._period
+            found.append(self._tunnel(Probe(self._terms.run, self._fingerprint, self._sequence, now)))
+            self._sequence += 1
+        if self._parts and now >= self._next_report:
+            self._next_report = now + _REPORT_US
+            found += [self._tunnel(part) for part in self._parts]
+        return found
+
+    def _tunnel(self, message: Probe | Report) -> Tunnel:
+        return Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(message))
+
+    def _refused(self) -> dict[int, str]:
+        """Return why the report of a vehicle is of no use, by system id."""
+        found = {}
+        for system, meter in self.meters.items():
+            if meter.doubled:
+                found[system] = "two companions have this id"
+            elif meter.fingerprint not in (None, self._fingerprint):
+                found[system] = "has other common settings: another fleet file, origin, roster or limits"
+        return found
+
+    def _awaited(self) -> dict[int, str]:
+        """Return why there is no report of a vehicle yet, by system id."""
+        found = {}
+        for system in self.meters.keys() - self._refused().keys():
+            parts = self._received.get(system, {})
+            if not parts or len(parts) < next(iter(parts.values())).parts:
+                heard = self.meters[system].fingerprint is not None
+                found[system] = "no report was received" if heard else "not heard"
+        return dict(sorted(found.items()))
+
+    @property
+    def over(self) -> bool:
+        """Whether the check has ended."""
+        return self.phase is Phase.OVER
+
+    @property
+    def doing(self) -> str:
+        """Description of what it does now."""
+        if self.phase is Phase.WAIT:
+            return f"waiting for {self._lacking(self._now) or 'nothing'}"
+        if self.phase is Phase.EXCHANGE:
+            silent = ", ".join(map(str, self._awaited()))
+            return f"exchanging reports{f', none of {silent}' if silent else ''}"
+        return str(self.phase.value)
+
+    @property
+    def share(self) -> float:
+        """Share (0…1) of the present phase that has passed."""
+        terms = self._terms
+        longest = {Phase.WAIT: 1e6 * terms.wait_s, Phase.MEASURE: 1e6 * terms.seconds}
+        passed = self._now - self._phase_began
+        return min(passed / max(longest.get(self.phase, _EXCHANGE_US), 1.0), 1.0)
+
+    def verdict(self) -> Verdict:
+        """Return the verdict on all that was reported."""
+        missing, reports = {**self._refused(), **self._awaited()}, {}
+        if self._parts:
+            reports[self._terms.system] = _whole(self._parts)
+        for system, parts in self._received.items():
+            if system not in missing:
+                reports[system] = _whole(list(parts.values()))
+        terms = self._terms
+        return judge(self._checks, reports, missing, terms.config, terms.origin, terms.seconds)
+
+
+def _whole(parts: list[Report]) -> Report:
+    """Return all parts of a report as one."""
+    ordered = sorted(parts, key=lambda part: part.part)
+    return ordered[0]._replace(links=tuple(link for part in ordered for link in part.links))

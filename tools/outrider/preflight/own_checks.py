@@ -1,0 +1,86 @@
+"""Checks of the own vehicle, which only its own process can make."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from companion.config import CompanionConfig
+from companion.flight.lowering import lowered
+from outrider.preflight.autopilot import TIMEOUTS, AutopilotFigures
+from outrider.preflight.findings import Check, Result
+from outrider.scenarios.fleet_file import stated_at
+
+SIGMA: Final = ("field", "position_sigma")
+CLOCK: Final = ("certified", "clock_us")
+_SHORT_TIMEOUT_S: Final = 0.5
+"""Time-out (s) up to which a vehicle without set-points is still near its plan."""
+
+
+def own_checks(
+    system: int, config: CompanionConfig, autopilot: AutopilotFigures, clock: int | None, *, doubled: bool
+) -> Iterator[Check]:
+    """Yield the checks of the vehicle ``system``; ``clock`` (µs): bound of its clock, None if unknown."""
+    subject = f"vehicle {system}"
+
+    def check(name: str, failed: bool, text: str) -> Check:
+        return Check(subject, name, Result.FAIL if failed else Result.PASS, text)
+
+    yield check("id", doubled, "another companion has this id" if doubled else "nobody else has it")
+    profile = autopilot.profile
+    if profile is None:
+        yield check("autopilot", True, "no heartbeat of an ArduPilot or PX4")
+        return
+    yield check("autopilot", False, profile.name)
+    yield check("position", bool(autopilot.trouble), autopilot.trouble or "reliable while it was measured")
+    yield _sigma(subject, config, autopilot.sigma)
+    yield _clock(subject, config, clock)
+    able = lowered(config.limits, profile, autopilot.parameters)
+    beyond = [able.lacking] if able.lacking else list(able.changes)
+    text = f"plans need more than the autopilot can follow: at most {'; '.join(beyond)}"
+    yield check("limits", bool(beyond), text if beyond else "the autopilot can follow the limits of plans")
+    yield _timeout(subject, autopilot, TIMEOUTS[profile.autopilot])
+    unread = [name for name in autopilot.unread if name not in TIMEOUTS.values()]
+    if unread:
+        text = f"not answered, stock values assumed: {', '.join(unread)}"
+        yield Check(subject, "parameters", Result.NOTE, text)
+
+
+def _sigma(subject: str, config: CompanionConfig, sigma: float | None) -> Check:
+    stated = stated_at(config, SIGMA)
+    if sigma is None:
+        if stated:
+            text = f"not reported; {stated[0]} m of the file counts, unconfirmed"
+            return Check(subject, "accuracy", Result.NOTE, text)
+        text = "neither receiver nor estimator reports it; needed: companion.field.position_sigma in the file"
+        return Check(subject, "accuracy", Result.FAIL, text)
+    if stated and sigma > stated[0]:
+        text = f"σ {sigma:.2f} m is more than the position_sigma of the file, {stated[0]} m"
+        return Check(subject, "accuracy", Result.FAIL, text)
+    return Check(subject, "accuracy", Result.PASS, f"σ {sigma:.2f} m at most")
+
+
+def _clock(subject: str, config: CompanionConfig, clock: int | None) -> Check:
+    stated = stated_at(config, CLOCK)
+    if clock is None:
+        kind = config.certified.fleet_time
+        why = "a source of fleet time is missing" if kind == "measured" else "a round trip is missing"
+        return Check(subject, "clock", Result.FAIL, f"its error has no bound: {why}")
+    limit = stated[0] if stated else 100_000
+    text = f"within {1e-3 * clock:.1f} ms"
+    if clock > limit:
+        text += f", more than clock_us, {1e-3 * limit:g} ms"
+    return Check(subject, "clock", Result.FAIL if clock > limit else Result.PASS, text)
+
+
+def _timeout(subject: str, autopilot: AutopilotFigures, name: str) -> Check:
+    value = autopilot.parameters.get(name)
+    if value is None:
+        return Check(subject, "time-out", Result.NOTE, f"{name} was not answered")
+    text = f"{name} {value:g} s"
+    if value <= _SHORT_TIMEOUT_S:
+        return Check(subject, "time-out", Result.PASS, text)
+    text += (
+        ": if companion and backup node both stop, the vehicle leaves its plan for that long; set 0.5 or less"
+    )
+    return Check(subject, "time-out", Result.NOTE, text)
