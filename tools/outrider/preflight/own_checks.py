@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import hypot
 from typing import Final
 
 from companion.config import CompanionConfig
+from companion.flight.autopilots import Profile
 from companion.flight.lowering import lowered
 from outrider.preflight.autopilot import TIMEOUTS, AutopilotFigures
 from outrider.preflight.findings import Check, Result
@@ -35,15 +37,36 @@ def own_checks(
     yield check("position", bool(autopilot.trouble), autopilot.trouble or "reliable while it was measured")
     yield _sigma(subject, config, autopilot.sigma)
     yield _clock(subject, config, clock)
-    able = lowered(config.limits, profile, autopilot.parameters)
-    beyond = [able.lacking] if able.lacking else list(able.changes)
-    text = f"plans need more than the autopilot can follow: at most {'; '.join(beyond)}"
-    yield check("limits", bool(beyond), text if beyond else "the autopilot can follow the limits of plans")
+    yield from _limits(subject, config, profile, autopilot)
     yield _timeout(subject, autopilot, TIMEOUTS[profile.autopilot])
     unread = [name for name in autopilot.unread if name not in TIMEOUTS.values()]
     if unread:
         text = f"not answered, stock values assumed: {', '.join(unread)}"
         yield Check(subject, "parameters", Result.NOTE, text)
+
+
+def _limits(
+    subject: str, config: CompanionConfig, profile: Profile, autopilot: AutopilotFigures
+) -> Iterator[Check]:
+    """Compare the limits of committed plans with those of the autopilot.
+
+    They bound acceleration and speed on each axis. They do not bound the jerk, which some firmware does.
+    """
+    limits = config.limits
+    planned = limits.model_copy(update={"a_total": max(hypot(*limits.u_max[:2]), limits.u_max[2])})
+    able = lowered(planned, profile, autopilot.parameters)
+    jerk = [change for change in able.changes if change.startswith("j_max")]
+    beyond = [able.lacking] if able.lacking else [change for change in able.changes if change not in jerk]
+    if beyond:
+        text = f"plans need more than the autopilot can follow: at most {'; '.join(beyond)}"
+        yield Check(subject, "limits", Result.FAIL, text)
+    else:
+        yield Check(
+            subject, "limits", Result.PASS, "the autopilot can follow speeds and accelerations of plans"
+        )
+    if jerk:
+        text = f"the autopilot bounds it, plans do not: at most {jerk[0]}; the tube has to cover this"
+        yield Check(subject, "jerk", Result.NOTE, text)
 
 
 def _sigma(subject: str, config: CompanionConfig, sigma: float | None) -> Check:

@@ -146,11 +146,13 @@ def settings_of(config: CompanionConfig, origin: FleetOrigin, measured: Measurem
 
 def text_of(file: FleetFile) -> str:
     """Return the text of a fleet file; the same values give the same text."""
-    body = yaml.safe_dump(file.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=120)
+    document = file.model_dump(mode="json", exclude={"fingerprint"})
+    body = yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
     return (
         f"# Written by outrider preflight: the settings that the vehicles {', '.join(map(str, file.roster))}"
         " have in common.\n# Name it in each companion file (fleet: PATH). Do not edit it: the fingerprint"
-        " would not fit.\n" + body
+        # In quotes, because digits and an e would be a number.
+        f" would not fit.\nfingerprint: '{file.fingerprint}'\n{body}"
     )
 
 
