@@ -86,11 +86,10 @@ class FleetFile(Settings):
     def _untouched(self) -> FleetFile:
         if len(set(self.roster)) < len(self.roster):
             raise ValueError("roster: names a vehicle twice; allowed: each system id once")
-        # The companion's rules for these settings apply before any companion file is known.
-        try:
-            config = _companion(CompanionConfig(), self)
-        except ValidationError as error:
-            raise ValueError(_reasons(error)) from None
+        if self.epoch_us % self.dt_us:
+            raise ValueError(f"epoch_us: {self.epoch_us} must be a multiple of dt_us = {self.dt_us}")
+        # Other rules of these settings depend on the rest of a companion file.
+        config = CompanionConfig.model_construct(**_replaced(CompanionConfig(), self))
         found = fingerprint_of(config, self.origin)
         if found != self.fingerprint:
             raise ValueError(
@@ -248,13 +247,24 @@ def _words(value: Any) -> str:
 
 def _companion(config: CompanionConfig, fleet: FleetFile) -> CompanionConfig:
     """Return ``config`` with the settings of ``fleet``; raises ValidationError if they break its rules."""
-    document = config.model_dump()
-    for path, value in _common(fleet):
-        part = document
-        for name in path[:-1]:
-            part = part[name]
-        part[path[-1]] = value
+    parts = _replaced(config, fleet)
+    document = config.model_copy(update=parts).model_dump()
     # The field begins beyond d_min; a file that leaves d_safe out takes no part in this.
     if config.field.d_safe <= fleet.d_min and "d_safe" not in config.field.model_fields_set:
         document["field"]["d_safe"] = 2.0 * fleet.d_min
     return CompanionConfig.model_validate(document)
+
+
+def _replaced(model: BaseModel, fleet: FleetFile) -> dict[str, Any]:
+    """Return the fields of ``model``, a companion's settings, with the settings of ``fleet``; unchecked."""
+    found: dict[str, Any] = {name: getattr(model, name) for name in type(model).model_fields}
+    for path, value in _common(fleet):
+        found[path[0]] = _with(found[path[0]], path[1:], value)
+    return found
+
+
+def _with(part: Any, path: tuple[str, ...], value: Any) -> Any:
+    if not path:
+        return value
+    inner = _with(getattr(part, path[0]), path[1:], value)
+    return part.model_copy(update={path[0]: inner})
