@@ -5,10 +5,9 @@ has what one vehicle has measured, in one or more parts.
 
 Sizes in bytes, little endian. Both: kind 1, run 4 (a random number of the sending process), fingerprint of
 the fleet's common settings 4. Probe: sequence number 4, time 7 (µs, the sender's clock), 0xFF up to 128.
-Report: flags 1 (bit 0: passed, bit 1: σ is known, bit 2: clock is known, bit 3: σ is fixed by the file, bit
-4: clock is fixed by the file), part 1, number of parts 1, autopilot 1 (MAV_AUTOPILOT), UTC 4 (s), σ 2 (mm),
-clock 4 (µs), then the links: peer 1, loss 2 (1/10 000), jitter 2 (0.1 ms), round trip 2 (0.1 ms; 65 535:
-unknown).
+Report: flags 1 (bit 0: passed; bits 1, 2, 3: σ, clock, tube are known; bits 4, 5, 6: the file states them),
+part 1, number of parts 1, autopilot 1 (MAV_AUTOPILOT), UTC 4 (s), σ 2 (mm), clock 4 (µs), tube 2 (mm), then
+the links: peer 1, loss 2 (1/10 000), jitter 2 (0.1 ms), round trip 2 (0.1 ms; 65 535: unknown).
 """
 
 from __future__ import annotations
@@ -24,12 +23,13 @@ PAYLOAD_TYPE = 0xDC06
 PROBE, REPORT = 1, 2
 _SIZE = 128
 _PROBE = Struct("<BIII7s")
-_REPORT = Struct("<BIIBBBBIHI")
+_REPORT = Struct("<BIIBBBBIHIH")
 _LINK = Struct("<BHHH")
 LINKS_PER_PART = (_SIZE - _REPORT.size) // _LINK.size
 """Largest number of links in one part of a report."""
-_PASSED, _SIGMA, _CLOCK, _SIGMA_FIXED, _CLOCK_FIXED = 1, 2, 4, 8, 16
-_FLAGS = _PASSED | _SIGMA | _CLOCK | _SIGMA_FIXED | _CLOCK_FIXED
+_KNOWN, _STATED = 1, 4
+"""Bit of the first of three flags: whether a figure is known, and whether the file states the setting."""
+_FLAGS = 0x7F
 MOST, UNKNOWN = 65_534, 65_535
 """Largest value of two bytes that is a figure, and the value that says there is none."""
 
@@ -58,21 +58,20 @@ class LinkReport(NamedTuple):
 class Report(NamedTuple):
     """What the process ``run`` has measured; this is ``part`` (0…) of ``parts``.
 
-    ``passed``: whether its vehicle passes. ``sigma`` (mm) and ``clock`` (µs): None if unknown; ``…_fixed``:
-    whether the vehicle's file states the setting. ``utc`` (s): time of the report.
+    ``passed``: whether its vehicle passes. ``figures``: σ (mm), bound of the clock (µs) and tube (mm), None
+    if unknown; ``stated``: whether the vehicle's file states each of these settings. ``utc`` (s): time of the
+    report.
     """
 
     run: int
     fingerprint: int
     passed: bool
-    sigma_fixed: bool
-    clock_fixed: bool
+    stated: tuple[bool, bool, bool]
     part: int
     parts: int
     autopilot: int
     utc: int
-    sigma: int | None
-    clock: int | None
+    figures: tuple[int | None, int | None, int | None]
     links: tuple[LinkReport, ...]
 
 
@@ -93,15 +92,11 @@ def _packed_probe(probe: Probe) -> bytes:
 def _packed_report(report: Report) -> bytes:
     if len(report.links) > LINKS_PER_PART or not report.part < report.parts:
         raise PlanWireError(f"part {report.part} of {report.parts} with {len(report.links)} links")
-    flags = (
-        (_PASSED if report.passed else 0)
-        | (_SIGMA if report.sigma is not None else 0)
-        | (_CLOCK if report.clock is not None else 0)
-        | (_SIGMA_FIXED if report.sigma_fixed else 0)
-        | (_CLOCK_FIXED if report.clock_fixed else 0)
-    )
+    flags = int(report.passed)
+    for number, (figure, stated) in enumerate(zip(report.figures, report.stated, strict=True)):
+        flags |= (figure is not None) << (_KNOWN + number) | stated << (_STATED + number)
     head = (REPORT, report.run, report.fingerprint, flags, report.part, report.parts, report.autopilot)
-    data = _REPORT.pack(*head, report.utc, report.sigma or 0, report.clock or 0)
+    data = _REPORT.pack(*head, report.utc, *(figure or 0 for figure in report.figures))
     for peer, loss, jitter, round_trip in report.links:
         data += _LINK.pack(peer, loss, jitter, UNKNOWN if round_trip is None else round_trip)
     return data
@@ -115,31 +110,29 @@ def unpack(data: bytes) -> Probe | Report:
     size = len(data) - _REPORT.size
     if not 0 <= size <= _SIZE - _REPORT.size or size % _LINK.size or data[0] != REPORT:
         raise PlanWireError(f"{len(data)} bytes are no message of a check before a flight")
-    _, run, fingerprint, flags, part, parts, autopilot, utc, sigma, clock = _REPORT.unpack_from(data)
+    _, run, fingerprint, flags, part, parts, autopilot, utc, *found = _REPORT.unpack_from(data)
     links = tuple(
         LinkReport(peer, loss, jitter, None if round_trip == UNKNOWN else round_trip)
         for peer, loss, jitter, round_trip in _LINK.iter_unpack(data[_REPORT.size :])
     )
-    known = flags & _SIGMA, flags & _CLOCK
-    if (
-        flags & ~_FLAGS
-        or not part < parts
-        or any(v and not k for v, k in zip((sigma, clock), known, strict=True))
-    ):
+    sigma, clock, tube = (
+        value if flags >> (_KNOWN + number) & 1 else None for number, value in enumerate(found)
+    )
+    hidden = any(value and flag is None for value, flag in zip(found, (sigma, clock, tube), strict=True))
+    if flags & ~_FLAGS or not part < parts or hidden:
         raise PlanWireError(f"a report with flags {flags}, part {part} of {parts} is not valid")
     if any(not link.peer or link.loss > 10_000 for link in links):
         raise PlanWireError("a report on a link that cannot be")
+    of_sigma, of_clock, of_tube = (bool(flags >> (_STATED + number) & 1) for number in range(3))
     return Report(
         run,
         fingerprint,
-        bool(flags & _PASSED),
-        bool(flags & _SIGMA_FIXED),
-        bool(flags & _CLOCK_FIXED),
+        bool(flags & 1),
+        (of_sigma, of_clock, of_tube),
         part,
         parts,
         autopilot,
         utc,
-        sigma if known[0] else None,
-        clock if known[1] else None,
+        (sigma, clock, tube),
         links,
     )

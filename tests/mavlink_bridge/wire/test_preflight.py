@@ -11,6 +11,8 @@ from mavlink_bridge.wire.preflight import LINKS_PER_PART, MOST, LinkReport, Prob
 
 words = st.integers(0, 2**32 - 1)
 tenths = st.integers(0, MOST)
+halves = st.integers(0, 65_535)
+STATED, UNKNOWN = (True, True, True), (None, None, None)
 probes = st.builds(Probe, words, words, words, st.integers(0, 2**56 - 1))
 links = st.builds(LinkReport, st.integers(1, 255), st.integers(0, 10_000), tenths, st.none() | tenths)
 
@@ -22,14 +24,12 @@ def reports(draw: st.DrawFn) -> Report:
         draw(words),
         draw(words),
         draw(st.booleans()),
-        draw(st.booleans()),
-        draw(st.booleans()),
+        draw(st.tuples(st.booleans(), st.booleans(), st.booleans())),
         draw(st.integers(0, parts - 1)),
         parts,
         draw(st.integers(0, 255)),
         draw(words),
-        draw(st.none() | st.integers(0, 65_535)),
-        draw(st.none() | words),
+        draw(st.tuples(st.none() | halves, st.none() | words, st.none() | halves)),
         tuple(draw(st.lists(links, max_size=LINKS_PER_PART))),
     )
 
@@ -71,9 +71,9 @@ def test_one_bit_makes_it_another_or_none(message: Probe | Report, bit: int) -> 
     [
         Probe(2**32, 0, 0, 0),
         Probe(0, 0, 0, 2**56),
-        Report(0, 0, True, True, True, 1, 1, 3, 0, None, None, ()),
-        Report(0, 0, True, True, True, 0, 1, 3, 0, 65_536, None, ()),
-        Report(0, 0, True, True, True, 0, 1, 3, 0, None, None, (LinkReport(1, 0, 0, 0),) * 20),
+        Report(0, 0, True, STATED, 1, 1, 3, 0, UNKNOWN, ()),
+        Report(0, 0, True, STATED, 0, 1, 3, 0, (65_536, None, None), ()),
+        Report(0, 0, True, STATED, 0, 1, 3, 0, UNKNOWN, (LinkReport(1, 0, 0, 0),) * 20),
     ],
 )
 def test_what_does_not_fit_is_refused(bad: Probe | Report) -> None:

@@ -13,6 +13,7 @@ from mavlink_bridge.network.channel import Channel, Direction, Faults
 from mavlink_bridge.network.simulated import SimulatedNetwork
 from outrider.preflight.findings import Check, Result, Verdict
 from outrider.preflight.node import Preflight, Terms
+from outrider.preflight.tube import TrackingError
 from outrider.scenarios.fly_config import FleetOrigin
 from sitl.node import LINK, Autopilot
 from tests.outrider.doctor.bench import autopilot
@@ -56,6 +57,7 @@ class Fleet:
         present: tuple[int, ...] = (1, 2, 3),
         twins: tuple[int, ...] = (),
         system_us: int | None = None,
+        flown: Mapping[int, TrackingError] | None = None,
         wait_s: float = 20.0,
         seed: int = 1,
     ) -> None:
@@ -77,6 +79,7 @@ class Fleet:
                     5.0,
                     wait_s,
                     run=1000 * twin + system,
+                    flown=(flown or {}).get(system),
                 )
                 bound = system_us
                 clock = None if bound is None else _clock(bound)

@@ -11,6 +11,7 @@ import pytest
 from companion.avoidance.certified.margins import between
 from mavlink_bridge.network.channel import Faults
 from outrider.preflight.findings import Result
+from outrider.preflight.tube import TrackingError
 from outrider.scenarios.fleet_file import FleetFile, text_of
 from outrider.yaml_files.yaml_file import read
 from tests.outrider.preflight.bench import ORIGIN, Fleet, companion, failed, found
@@ -164,6 +165,32 @@ def test_a_missing_vehicle_is_waited_for_and_then_named() -> None:
         links = {("3 → 1", "link"), ("3 → 2", "link")}
         assert failed(verdict) == {("vehicle 3", "report"), *clocks, *links}
         assert found(verdict, "vehicle 3", "report").text == "not heard"
+
+
+FLOWN = TrackingError(0.412, 60.0, 1.9)
+
+
+def test_the_tube_is_the_worst_that_was_flown_and_the_settings_cover_who_has_not_flown() -> None:
+    assert fleet_file(Fleet()).tube == 0.25
+    flown = {1: FLOWN, 2: FLOWN._replace(largest=0.1), 3: FLOWN._replace(largest=0.2)}
+    fleet = fleet_file(Fleet(flown=flown))
+    assert (fleet.tube, fleet.measured.configured) == (0.42, ())
+    assert [one.tube for one in fleet.measured.vehicles] == [0.412, 0.1, 0.2]
+    partly = fleet_file(Fleet(flown={2: flown[2]}))
+    assert (partly.tube, partly.measured.configured) == (0.25, ("tube",))
+
+
+def test_a_tube_of_the_file_is_kept_or_fails() -> None:
+    wide, narrow = (dict.fromkeys((1, 2, 3), companion(certified={"tube": tube})) for tube in (0.5, 0.4))
+    assert fleet_file(Fleet(configs=wide, flown={1: FLOWN})).tube == 0.5
+    verdict = Fleet(configs=narrow, flown={1: FLOWN}).run()["preflight-1"]
+    assert failed(verdict) == {("vehicle 1", "tube")}
+
+
+def test_a_gentle_flight_says_nothing_about_the_tube() -> None:
+    verdict = Fleet(flown={1: FLOWN._replace(acceleration=1.5)}).run()["preflight-1"]
+    assert failed(verdict) == {("vehicle 1", "tube")}
+    assert "too gentle" in found(verdict, "vehicle 1", "tube").text
 
 
 def test_the_same_run_gives_the_same_bytes() -> None:

@@ -222,6 +222,9 @@ def preflight(
         float, typer.Option(min=1.0, max=86400.0, help="Longest time to wait for the others, s.")
     ] = 120.0,
     signing_key: SigningKey = None,
+    flight: Annotated[
+        Path | None, typer.Option(help="Log of a flight of this vehicle alone, which measures the tube.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="The fleet file; one that exists is replaced.")] = Path(
         "fleet.yaml"
     ),
@@ -235,7 +238,9 @@ def preflight(
     from outrider.preflight.command import Options
     from outrider.preflight.command import preflight as checking
 
-    options = Options(autopilot, swarm, config, system, roster, seconds, wait, signing_key, out, as_json)
+    options = Options(
+        autopilot, swarm, config, system, roster, seconds, wait, signing_key, flight, out, as_json
+    )
     raise typer.Exit(checking(options))
 
 

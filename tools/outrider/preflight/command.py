@@ -26,6 +26,7 @@ from outrider.key_files import key_of
 from outrider.preflight.findings import Verdict
 from outrider.preflight.node import Preflight, Terms
 from outrider.preflight.page import document, show
+from outrider.preflight.tube import tracking_error
 from outrider.resources import find
 from outrider.scenarios.fleet_file import text_of, with_fleet_file
 from outrider.scenarios.fly_config import FlyConfig
@@ -48,6 +49,7 @@ class Options:
     seconds: float = 20.0
     wait: float = 120.0
     signing_key: Path | None = None
+    flight: Path | None = None
     out: Path = Path("fleet.yaml")
     as_json: bool = False
 
@@ -95,7 +97,10 @@ def checked(options: Options) -> Request:
     companion = _with_roster(companion, tuple(sorted(set(roster))))
     endpoints = {name: _endpoint(name, getattr(options, name)) for name in _LOCAL}
     run = secrets.randbits(32)
-    terms = Terms(config.system, companion, config.origin, options.seconds, options.wait, run)
+    flown = None
+    if options.flight is not None:
+        flown = tracking_error(options.flight, config.system, planar=companion.planar)
+    terms = Terms(config.system, companion, config.origin, options.seconds, options.wait, run, flown)
     return Request(terms, endpoints, config.period_us)
 
 

@@ -28,7 +28,7 @@ _MOST_LOSS: Final = 0.6
 """Loss up to which flights were measured to converge in time (docs/certified.md)."""
 _CLOCK_ROOM: Final = 1.25
 """Factor between the measured bound of a clock and the one that the fleet file allows."""
-_SIGMA_STEP, _CLOCK_STEP_US = 0.01, 1_000
+_CLOCK_STEP_US: Final = 1_000
 
 
 def judge(
@@ -55,20 +55,16 @@ def judge(
     if failed:
         return Verdict(tuple(checks), None)
     found = _settings(config, reports)
-    checks.append(
-        Check(
-            "fleet", "tube", Result.NOTE, f"{found.certified.tube} m of the file, not measured on the ground"
-        )
-    )
     text = f"plans keep {distance_of(found):.2f} m for a d_min of {found.field.d_min:g} m"
     checks.append(Check("fleet", "distance", Result.PASS, text))
     return Verdict(tuple(checks), settings_of(found, origin, _measurement(reports, seconds)))
 
 
 def _of_report(system: int, report: Report) -> Check:
-    sigma = "unknown" if report.sigma is None else f"{1e-3 * report.sigma:.2f} m"
-    clock = "unknown" if report.clock is None else f"{1e-3 * report.clock:.1f} ms"
-    text = f"σ {sigma}, clock {clock}"
+    figures = zip(("σ", "clock", "tube"), report.figures, ("m", "ms", "m"), strict=True)
+    known = [(name, 1e-3 * figure, unit) for name, figure, unit in figures if figure is not None]
+    text = ", ".join(f"{name} {figure:.{1 if unit == 'ms' else 2}f} {unit}" for name, figure, unit in known)
+    text = text or "nothing is known"
     if not report.passed:
         return Check(
             f"vehicle {system}", "report", Result.FAIL, f"does not pass, its own table says why; {text}"
@@ -89,32 +85,50 @@ def _links(system: int, report: Report) -> Iterator[Check]:
 def _settings(config: CompanionConfig, reports: Mapping[int, Report]) -> CompanionConfig:
     """Return the settings of the fleet: measured values where no vehicle's file states one."""
     field, certified = config.field, config.certified
-    sigmas = [report.sigma for report in reports.values() if report.sigma is not None]
-    if sigmas and not any(report.sigma_fixed for report in reports.values()):
-        steps = ceil(max(sigmas) / (1e3 * _SIGMA_STEP))
-        field = field.model_copy(update={"position_sigma": round(steps * _SIGMA_STEP, 6)})
-    clocks = [report.clock for report in reports.values() if report.clock is not None]
-    if clocks and not any(report.clock_fixed for report in reports.values()):
-        allowed = ceil(_CLOCK_ROOM * max(clocks) / _CLOCK_STEP_US) * _CLOCK_STEP_US
+    sigma, clock, tube = (_largest(reports, number) for number in range(3))
+    if sigma is not None:
+        field = field.model_copy(update={"position_sigma": _rounded_up(sigma)})
+    if clock is not None:
+        allowed = ceil(_CLOCK_ROOM * clock / _CLOCK_STEP_US) * _CLOCK_STEP_US
         certified = certified.model_copy(update={"clock_us": min(max(allowed, _CLOCK_STEP_US), WORST)})
+    if tube is not None:
+        # Without a measurement of all vehicles the setting covers the others.
+        least = 0.0 if _all_known(reports, 2) else certified.tube
+        certified = certified.model_copy(update={"tube": max(_rounded_up(tube), least)})
     return config.model_copy(update={"field": field, "certified": certified})
+
+
+def _largest(reports: Mapping[int, Report], number: int) -> int | None:
+    """Return the largest of these figures; None if a file states the setting, or without any."""
+    if any(report.stated[number] for report in reports.values()):
+        return None
+    figures = (report.figures[number] for report in reports.values())
+    return max((figure for figure in figures if figure is not None), default=None)
+
+
+def _all_known(reports: Mapping[int, Report], number: int) -> bool:
+    return all(report.figures[number] is not None for report in reports.values())
+
+
+def _rounded_up(millimetres: int) -> float:
+    """Return a length in m, rounded up to cm, at least 1 cm."""
+    return max(-(-millimetres // 10), 1) / 100.0
 
 
 def _measurement(reports: Mapping[int, Report], seconds: float) -> Measurement:
     last = max(report.utc for report in reports.values())
-    configured = ["tube"]
-    if any(report.sigma is None for report in reports.values()):
-        configured.append("position_sigma")
+    settings = {"position_sigma": 0, "tube": 2}
     return Measurement(
         at=datetime.fromtimestamp(last, UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         seconds=seconds,
-        configured=tuple(configured),
+        configured=tuple(name for name, number in settings.items() if not _all_known(reports, number)),
         vehicles=tuple(
             VehicleFigures(
                 system=system,
                 firmware=KNOWN[report.autopilot].name if report.autopilot in KNOWN else "unknown",
-                position_sigma=None if report.sigma is None else round(1e-3 * report.sigma, 3),
-                clock_us=report.clock,
+                position_sigma=_metres(report.figures[0]),
+                clock_us=report.figures[1],
+                tube=_metres(report.figures[2]),
             )
             for system, report in sorted(reports.items())
         ),
@@ -130,3 +144,7 @@ def _measurement(reports: Mapping[int, Report], seconds: float) -> Measurement:
             for peer, loss, jitter, round_trip in sorted(report.links)
         ),
     )
+
+
+def _metres(millimetres: int | None) -> float | None:
+    return None if millimetres is None else round(1e-3 * millimetres, 3)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from math import ceil
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -29,7 +30,8 @@ from outrider.preflight.clock_meter import ClockMeter
 from outrider.preflight.findings import Check, Result, Verdict
 from outrider.preflight.judgement import judge
 from outrider.preflight.link_meter import LinkMeter
-from outrider.preflight.own_checks import CLOCK, SIGMA, own_checks
+from outrider.preflight.own_checks import CLOCK, SIGMA, TUBE, own_checks
+from outrider.preflight.tube import TrackingError
 from outrider.scenarios.fleet_file import stated_at
 from outrider.scenarios.fly_config import FleetOrigin
 
@@ -60,7 +62,7 @@ class Terms:
     """Terms of a check: ``config`` has the roster as ``certified.fleet``.
 
     ``seconds``: duration of the measurement; ``wait_s``: longest time to wait for the others. ``run``: random
-    number (32 bits) of this process.
+    number (32 bits) of this process. ``flown``: tracking error of the vehicle in a recorded flight.
     """
 
     system: int
@@ -69,6 +71,7 @@ class Terms:
     seconds: float
     wait_s: float
     run: int
+    flown: TrackingError | None = None
 
     @property
     def others(self) -> tuple[int, ...]:
@@ -214,29 +217,32 @@ class Preflight:
 
     def _report(self, now: int) -> None:
         """Check the own vehicle, and make the report that is sent from now on."""
-        terms, autopilot, clock = self._terms, self.autopilot, self.clock.bound
-        self._checks = tuple(own_checks(terms.system, terms.config, autopilot, clock, doubled=self._doubled))
-        figures = [meter.figure(now).report(system) for system, meter in self.meters.items()]
-        groups = [figures[k : k + LINKS_PER_PART] for k in range(0, len(figures), LINKS_PER_PART)]
-        profile = autopilot.profile
-        passed = all(check.result is not Result.FAIL for check in self._checks)
-        self._parts = [
-            Report(
-                terms.run,
-                self._fingerprint,
-                passed,
-                bool(stated_at(terms.config, SIGMA)),
-                bool(stated_at(terms.config, CLOCK)),
-                part,
-                len(groups),
-                0 if profile is None else profile.autopilot,
-                now // 1_000_000,
-                None if autopilot.sigma is None else min(-int(-1e3 * autopilot.sigma // 1), 65_535),
-                None if clock is None else min(clock, 0xFFFFFFFF),
-                tuple(group),
-            )
-            for part, group in enumerate(groups)
-        ]
+        terms, autopilot, clock, flown = self._terms, self.autopilot, self.clock.bound, self._terms.flown
+        self._checks = tuple(
+            own_checks(terms.system, terms.config, autopilot, clock, flown, doubled=self._doubled)
+        )
+        links = [meter.figure(now).report(system) for system, meter in self.meters.items()]
+        groups = [links[k : k + LINKS_PER_PART] for k in range(0, len(links), LINKS_PER_PART)]
+        figures = (
+            None if autopilot.sigma is None else _millimetres(autopilot.sigma),
+            None if clock is None else min(clock, 0xFFFFFFFF),
+            None if flown is None else _millimetres(flown.largest),
+        )
+        of_sigma, of_clock, of_tube = (bool(stated_at(terms.config, path)) for path in (SIGMA, CLOCK, TUBE))
+        number = 0 if autopilot.profile is None else autopilot.profile.autopilot
+        report = Report(
+            terms.run,
+            self._fingerprint,
+            all(check.result is not Result.FAIL for check in self._checks),
+            (of_sigma, of_clock, of_tube),
+            0,
+            len(groups),
+            number,
+            now // 1_000_000,
+            figures,
+            (),
+        )
+        self._parts = [report._replace(part=k, links=tuple(group)) for k, group in enumerate(groups)]
 
     def _due(self, now: int) -> list[Message]:
         """Return the probe and the own report, as far as they are due."""
@@ -306,6 +312,11 @@ class Preflight:
                 reports[system] = _whole(list(parts.values()))
         terms = self._terms
         return judge(self._checks, reports, missing, terms.config, terms.origin, terms.seconds)
+
+
+def _millimetres(length: float) -> int:
+    """Return ``length`` (m) in mm, rounded up, at most what two bytes hold."""
+    return min(ceil(1e3 * length), 65_535)
 
 
 def _whole(parts: list[Report]) -> Report:

@@ -11,18 +11,31 @@ from companion.flight.autopilots import Profile
 from companion.flight.lowering import lowered
 from outrider.preflight.autopilot import TIMEOUTS, AutopilotFigures
 from outrider.preflight.findings import Check, Result
+from outrider.preflight.tube import TrackingError
 from outrider.scenarios.fleet_file import stated_at
 
 SIGMA: Final = ("field", "position_sigma")
 CLOCK: Final = ("certified", "clock_us")
+TUBE: Final = ("certified", "tube")
+_EXERCISED: Final = 0.8
+"""Share of ``limits.u_max`` that the set-points of a flight must reach, for its tracking error to count."""
 _SHORT_TIMEOUT_S: Final = 0.5
 """Time-out (s) up to which a vehicle without set-points is still near its plan."""
 
 
 def own_checks(
-    system: int, config: CompanionConfig, autopilot: AutopilotFigures, clock: int | None, *, doubled: bool
+    system: int,
+    config: CompanionConfig,
+    autopilot: AutopilotFigures,
+    clock: int | None,
+    flown: TrackingError | None,
+    *,
+    doubled: bool,
 ) -> Iterator[Check]:
-    """Yield the checks of the vehicle ``system``; ``clock`` (µs): bound of its clock, None if unknown."""
+    """Yield the checks of the vehicle ``system``.
+
+    ``clock`` (µs): bound of its clock, None if unknown; ``flown``: its tracking error in a recorded flight.
+    """
     subject = f"vehicle {system}"
 
     def check(name: str, failed: bool, text: str) -> Check:
@@ -37,6 +50,7 @@ def own_checks(
     yield check("position", bool(autopilot.trouble), autopilot.trouble or "reliable while it was measured")
     yield _sigma(subject, config, autopilot.sigma)
     yield _clock(subject, config, clock)
+    yield _tube(subject, config, flown)
     yield from _limits(subject, config, profile, autopilot)
     yield _timeout(subject, autopilot, TIMEOUTS[profile.autopilot])
     unread = [name for name in autopilot.unread if name not in TIMEOUTS.values()]
@@ -94,6 +108,24 @@ def _clock(subject: str, config: CompanionConfig, clock: int | None) -> Check:
     if clock > limit:
         text += f", more than clock_us, {1e-3 * limit:g} ms"
     return Check(subject, "clock", Result.FAIL if clock > limit else Result.PASS, text)
+
+
+def _tube(subject: str, config: CompanionConfig, flown: TrackingError | None) -> Check:
+    tube = config.certified.tube
+    if flown is None:
+        return Check(
+            subject, "tube", Result.NOTE, f"{tube:g} m counts, not measured; --flight LOG measures it"
+        )
+    text = (
+        f"{flown.largest:.2f} m beside the set-points at most, in {flown.seconds:.0f} s of a recorded flight"
+    )
+    needed = _EXERCISED * max(config.limits.u_max[:2])
+    if flown.acceleration < needed:
+        text += f" that is too gentle: {flown.acceleration:.1f} m/s²; needed: {needed:.1f} m/s² at least"
+        return Check(subject, "tube", Result.FAIL, text)
+    if stated_at(config, TUBE) and flown.largest > tube:
+        return Check(subject, "tube", Result.FAIL, f"{text}, more than certified.tube, {tube:g} m")
+    return Check(subject, "tube", Result.PASS, text)
 
 
 def _timeout(subject: str, autopilot: AutopilotFigures, name: str) -> Check:

@@ -37,6 +37,9 @@ class VehicleFigures(Settings):
     firmware: str = Field(max_length=40)
     position_sigma: float | None = Field(description="m, as receiver and estimator report it; null: unknown")
     clock_us: int | None = Field(ge=0, description="bound of the error of its fleet time, µs; null: unknown")
+    tube: float | None = Field(
+        description="m, largest tracking error in a recorded flight; null: not measured"
+    )
 
 
 class LinkFigures(Settings):
@@ -50,11 +53,13 @@ class LinkFigures(Settings):
 
 
 class Measurement(Settings):
-    """When and how the figures were measured. ``tube`` is never measured on the ground."""
+    """When and how the figures were measured."""
 
     at: str = Field(max_length=40, description="UTC of the last report")
     seconds: Annotated[float, _DURATION]
-    configured: tuple[str, ...] = Field(max_length=16, description="settings that were not measured")
+    configured: tuple[str, ...] = Field(
+        max_length=16, description="settings that were not measured on all vehicles"
+    )
     vehicles: tuple[VehicleFigures, ...] = Field(max_length=255)
     links: tuple[LinkFigures, ...] = Field(max_length=65_025)
 
