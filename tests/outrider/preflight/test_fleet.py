@@ -7,14 +7,22 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from companion.avoidance.certified.margins import between
+from mavlink_bridge.messages import Source, Tunnel
 from mavlink_bridge.network.channel import Faults
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.preflight import MOST, LinkReport, Report, pack
 from outrider.preflight.findings import Result
+from outrider.preflight.judgement import judge
+from outrider.preflight.node import Preflight, Terms
 from outrider.preflight.tube import TrackingError
 from outrider.scenarios.fleet_file import FleetFile, text_of
 from outrider.yaml_files.yaml_file import read
-from tests.outrider.preflight.bench import ORIGIN, Fleet, companion, failed, found
+from tests.outrider.preflight.bench import BEGIN, ORIGIN, Fleet, companion, failed, found
 
 
 def fleet_file(fleet: Fleet) -> FleetFile:
@@ -191,6 +199,65 @@ def test_a_gentle_flight_says_nothing_about_the_tube() -> None:
     verdict = Fleet(flown={1: FLOWN._replace(acceleration=1.5)}).run()["preflight-1"]
     assert failed(verdict) == {("vehicle 1", "tube")}
     assert "too gentle" in found(verdict, "vehicle 1", "tube").text
+
+
+def test_an_accuracy_that_no_setting_allows_fails() -> None:
+    far = Report(1, 0, True, (False,) * 3, 0, 1, 3, 0, (6_000, 1_000, None), ())
+    verdict = judge((), {1: far, 2: far}, {}, companion(certified={"fleet": [1, 2]}), ORIGIN, 5.0)
+    assert failed(verdict) == {("fleet", "settings")}
+    assert "position_sigma" in found(verdict, "fleet", "settings").text
+
+
+halves, words = st.none() | st.integers(0, 65_535), st.integers(0, 2**32 - 1)
+links = st.builds(
+    LinkReport,
+    st.integers(1, 255),
+    st.integers(0, 10_000),
+    st.integers(0, MOST),
+    st.none() | st.integers(0, MOST),
+)
+reports = st.builds(
+    Report,
+    words,
+    words,
+    st.booleans(),
+    st.tuples(*[st.booleans()] * 3),
+    st.just(0),
+    st.just(1),
+    st.integers(0, 255),
+    words,
+    st.tuples(halves, st.none() | words, halves),
+    st.lists(links, max_size=11).map(tuple),
+)
+
+
+@given(st.dictionaries(st.sampled_from([1, 2, 3]), reports, min_size=1))
+def test_whatever_others_report_gives_a_verdict_and_a_file_only_if_all_is_good(
+    heard: dict[int, Report],
+) -> None:
+    missing = {system: "not heard" for system in (1, 2, 3) if system not in heard}
+    verdict = judge((), heard, missing, companion(), ORIGIN, 5.0)
+    assert verdict.passed == (failed(verdict) == set())
+    if verdict.fleet is not None:
+        assert all(one.passed for one in heard.values())
+        assert read(text_of(verdict.fleet).encode(), "fleet.yaml", FleetFile) == verdict.fleet
+
+
+payloads = st.binary(max_size=128) | reports.map(pack)
+
+
+@given(st.lists(st.tuples(st.sampled_from([1, 2, 9]), st.sampled_from([0xDC01, 0xDC04, 0xDC06]), payloads)))
+def test_whatever_arrives_the_check_goes_on(heard: list[tuple[int, int, bytes]]) -> None:
+    node = Preflight(Terms(1, companion(), ORIGIN, 5.0, 5.0, 7))
+    codec = Codec()
+    for k, (system, kind, payload) in enumerate(heard):
+        data = codec.encode(Tunnel(Source(system, 195), 0, 0, kind, payload))
+        for datagram in node.step(BEGIN + 10_000 * k, [Datagram("swarm", data), Datagram("autopilot", data)]):
+            assert datagram.link in ("autopilot", "swarm")
+    while not node.over:
+        heard.append((0, 0, b""))
+        node.step(BEGIN + 1_000_000 * len(heard), [])
+    assert not node.verdict().passed
 
 
 def test_the_same_run_gives_the_same_bytes() -> None:

@@ -10,6 +10,8 @@ from datetime import UTC, datetime
 from math import ceil
 from typing import Final
 
+from pydantic import ValidationError
+
 from companion.config import CompanionConfig
 from companion.flight.autopilots.known import KNOWN
 from mavlink_bridge.wire.preflight import Report
@@ -55,9 +57,15 @@ def judge(
     if failed:
         return Verdict(tuple(checks), None)
     found = _settings(config, reports)
+    try:
+        fleet = settings_of(found, origin, _measurement(reports, seconds))
+    except ValidationError as error:
+        # A figure that no setting allows, for example an accuracy of 6 m.
+        words = "; ".join(f"{one['loc'][-1]}: {one['msg']}" for one in error.errors() if one["loc"])
+        return Verdict((*checks, Check("fleet", "settings", Result.FAIL, words)), None)
     text = f"plans keep {distance_of(found):.2f} m for a d_min of {found.field.d_min:g} m"
     checks.append(Check("fleet", "distance", Result.PASS, text))
-    return Verdict(tuple(checks), settings_of(found, origin, _measurement(reports, seconds)))
+    return Verdict(tuple(checks), fleet)
 
 
 def _of_report(system: int, report: Report) -> Check:
@@ -65,6 +73,8 @@ def _of_report(system: int, report: Report) -> Check:
     known = [(name, 1e-3 * figure, unit) for name, figure, unit in figures if figure is not None]
     text = ", ".join(f"{name} {figure:.{1 if unit == 'ms' else 2}f} {unit}" for name, figure, unit in known)
     text = text or "nothing is known"
+    if report.figures[1] is not None and report.figures[1] > WORST:
+        return Check(f"vehicle {system}", "report", Result.FAIL, f"{text}; allowed: {1e-3 * WORST:g} ms")
     if not report.passed:
         return Check(
             f"vehicle {system}", "report", Result.FAIL, f"does not pass, its own table says why; {text}"
