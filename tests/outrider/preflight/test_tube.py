@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mavlink_bridge.messages import LocalPosition, Message, SetpointLocal, Source, Vector
+from mavlink_bridge.messages import Heartbeat, LocalPosition, Message, SetpointLocal, Source, Vector
 from mavlink_bridge.tlog.log import TlogWriter
 from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
@@ -17,6 +17,7 @@ from outrider.preflight.tube import tracking_error
 
 OWN, AUTOPILOT = Source(1, 195), Source(1, 1)
 BEGIN = 1_700_000_000_000_000
+GUIDED = 4
 RADIUS, RATE = 4.0, 0.7
 """m, rad/s: a circle with 1.96 m/s²."""
 
@@ -43,8 +44,15 @@ def position(time: float, off: Vector = (0.0, 0.0, 0.0), source: Source = AUTOPI
     return LocalPosition(source, round(1e6 * time), (x, y, z), velocity)
 
 
+def beat(mode: int = GUIDED, base_mode: int = 0x81) -> Heartbeat:
+    return Heartbeat(AUTOPILOT, 2, 3, base_mode, mode, 4)
+
+
 def log(path: Path, messages: list[tuple[float, Message]]) -> Path:
+    """A log in which the autopilot follows set-points from the first second on, and those ``messages``."""
     codec = Codec()
+    if not any(isinstance(message, Heartbeat) for _, message in messages):
+        messages = [(0.0, beat()), *messages]
     with TlogWriter(path) as writer:
         for time, message in sorted(messages, key=lambda one: one[0]):
             writer.write(BEGIN + round(1e6 * time), 0, codec.encode(message))
@@ -95,6 +103,19 @@ def test_what_is_flown_without_set_points_and_by_others_does_not_count(tmp_path:
     found = tracking_error(log(tmp_path / "flight.tlog", sent), 1, planar=False)
     assert found.largest < 2e-3
     assert 19.0 < found.seconds < 20.0
+
+
+@pytest.mark.parametrize("before", [beat(mode=5), beat(base_mode=0x01)], ids=["another mode", "disarmed"])
+def test_only_what_is_flown_by_set_points_counts(before: Heartbeat, tmp_path: Path) -> None:
+    """Some are sent before the autopilot follows them; heartbeats of the companion change nothing."""
+    companion = Heartbeat(OWN, 18, 8, 0, 0, 4)
+    sent: list[tuple[float, Message]] = [(0.0, before), (5.0, beat()), (6.0, companion)]
+    sent += [(0.001 + 0.02 * k, setpoint(0.001 + 0.02 * k)) for k in range(1000)]
+    times = [0.005 + 0.05 * k for k in range(390)]
+    sent += [(time, position(time, (3.0, 0.0, 0.0) if time < 5.0 else (0.2, 0.0, 0.0))) for time in times]
+    found = tracking_error(log(tmp_path / "flight.tlog", sent), 1, planar=False)
+    assert found.largest == pytest.approx(0.2, abs=2e-3)
+    assert found.seconds == pytest.approx(14.5, abs=0.2)
 
 
 @pytest.mark.parametrize("system", [1, 2])

@@ -2,7 +2,8 @@
 
 A log has the set-points that a companion sent and the positions that the autopilot reported. Both are in the
 vehicle's own local frame and on one clock, that of the log. A position is compared with the set-point sent
-before it, moved on by its velocity and acceleration. The position was true some milliseconds before it was
+before it, moved on by its velocity and acceleration, while the autopilot is in the mode in which it follows
+set-points: some are sent before. The position was true some milliseconds before it was
 recorded, so the error is overestimated by the speed times this delay.
 """
 
@@ -14,8 +15,10 @@ from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from companion.flight.autopilots import is_guided
+from companion.flight.autopilots.known import profile_of
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.messages import LocalPosition, SetpointLocal, Vector
+from mavlink_bridge.messages import Heartbeat, LocalPosition, SetpointLocal, Vector
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.errors import InputError
@@ -24,9 +27,11 @@ _FRESH_US: Final = 200_000
 """Age (µs) of the last set-point up to which the vehicle is assumed to follow it."""
 _LEAST_S: Final = 10.0
 """Duration (s) of flight below which a log says nothing."""
+_NO_AUTOPILOT: Final[int] = mavlink.MAV_AUTOPILOT_INVALID
 _POSITION_IGNORED: Final = 0x007
 """Bits of the type mask that ignore the position."""
 _IDS: Final = (
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
     mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
 )
@@ -52,17 +57,19 @@ def tracking_error(path: Path, system: int, *, planar: bool) -> TrackingError:
     codec = Codec(lambda identifier, sender, _component: identifier in _IDS and sender == system)
     last: tuple[int, SetpointLocal] | None = None
     largest = acceleration = 0.0
-    followed, before = 0, None
+    followed, before, guided = 0, None, False
     try:
         for record in read_tlog(path):
             for message in codec.feed(record.frame, whole=True):
-                if isinstance(message, SetpointLocal):
+                if isinstance(message, Heartbeat):
+                    guided = _guided(message) if message.autopilot != _NO_AUTOPILOT else guided
+                elif isinstance(message, SetpointLocal):
                     if not message.type_mask & _POSITION_IGNORED:
                         last = record.time, message
                         acceleration = max(acceleration, _finite(hypot(*message.acceleration[:2])))
                 elif isinstance(message, LocalPosition) and last is not None:
                     age = record.time - last[0]
-                    if 0 <= age <= _FRESH_US:
+                    if guided and 0 <= age <= _FRESH_US:
                         largest = max(largest, _distance(last[1], age, message, planar=planar))
                         followed += 0 if before is None else min(max(record.time - before, 0), _FRESH_US)
                         before = record.time
@@ -77,6 +84,13 @@ def tracking_error(path: Path, system: int, *, planar: bool) -> TrackingError:
             f" {_LEAST_S:.0f} s, in the log of a flight of outrider fly with this vehicle"
         )
     return TrackingError(largest, seconds, acceleration)
+
+
+def _guided(beat: Heartbeat) -> bool:
+    """Return whether the autopilot is armed and follows set-points."""
+    profile = profile_of(beat)
+    armed = bool(beat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+    return profile is not None and armed and is_guided(profile, beat)
 
 
 def _finite(value: float) -> float:
