@@ -23,10 +23,11 @@ from mavlink_bridge.messages import Message, Source, SystemTime, Timesync, Tunne
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.fleet_time import PAYLOAD_TYPE as FLEET_TIME
-from mavlink_bridge.wire.preflight import LINKS_PER_PART, PAYLOAD_TYPE, Probe, Report, pack, unpack
+from mavlink_bridge.wire.preflight import PAYLOAD_TYPE, Probe, Report, pack, unpack
 from mavlink_bridge.wire.signing import Signing
 from outrider.preflight.autopilot import RECEIVED, AutopilotFigures
 from outrider.preflight.clock_meter import ClockMeter
+from outrider.preflight.exchange import Exchange, in_parts, whole
 from outrider.preflight.findings import Check, Result, Verdict
 from outrider.preflight.judgement import judge
 from outrider.preflight.link_meter import LinkMeter
@@ -122,7 +123,7 @@ class Preflight:
         self._doubled = False
         self._checks: tuple[Check, ...] = ()
         self._parts: list[Report] = []
-        self._received: dict[int, dict[int, Report]] = {}
+        self._exchange = Exchange(self.meters, self._fingerprint)
         self._complete_at: int | None = None
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
@@ -176,11 +177,8 @@ class Preflight:
         elif system in self.meters:
             if isinstance(message, Probe):
                 self.meters[system].receive(now, message)
-            elif message.fingerprint == self._fingerprint:
-                known = self._received.setdefault(system, {})
-                if any(part.run != message.run or part.parts != message.parts for part in known.values()):
-                    known.clear()
-                known[message.part] = message
+            else:
+                self._exchange.receive(system, message)
 
     def _advance(self, now: int) -> None:
         terms, passed = self._terms, now - self._phase_began
@@ -196,7 +194,7 @@ class Preflight:
                 self._begin(now, Phase.EXCHANGE)
                 self._report(now)
         elif self.phase is Phase.EXCHANGE:
-            if self._complete_at is None and not self._awaited():
+            if self._complete_at is None and not self._exchange.awaited():
                 self._complete_at = now
             lingered = self._complete_at is not None and now - self._complete_at >= _LINGER_US
             if lingered or passed >= _EXCHANGE_US:
@@ -222,7 +220,6 @@ class Preflight:
             own_checks(terms.system, terms.config, autopilot, clock, flown, doubled=self._doubled)
         )
         links = [meter.figure(now).report(system) for system, meter in self.meters.items()]
-        groups = [links[k : k + LINKS_PER_PART] for k in range(0, len(links), LINKS_PER_PART)]
         figures = (
             None if autopilot.sigma is None else _millimetres(autopilot.sigma),
             None if clock is None else min(clock, 0xFFFFFFFF),
@@ -236,13 +233,13 @@ class Preflight:
             all(check.result is not Result.FAIL for check in self._checks),
             (of_sigma, of_clock, of_tube),
             0,
-            len(groups),
+            1,
             number,
             now // 1_000_000,
             figures,
             (),
         )
-        self._parts = [report._replace(part=k, links=tuple(group)) for k, group in enumerate(groups)]
+        self._parts = in_parts(report, links)
 
     def _due(self, now: int) -> list[Message]:
         """Return the probe and the own report, as far as they are due."""
@@ -259,26 +256,6 @@ class Preflight:
     def _tunnel(self, message: Probe | Report) -> Tunnel:
         return Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(message))
 
-    def _refused(self) -> dict[int, str]:
-        """Return why the report of a vehicle is of no use, by system id."""
-        found = {}
-        for system, meter in self.meters.items():
-            if meter.doubled:
-                found[system] = "two companions have this id"
-            elif meter.fingerprint not in (None, self._fingerprint):
-                found[system] = "has other common settings: another fleet file, origin, roster or limits"
-        return found
-
-    def _awaited(self) -> dict[int, str]:
-        """Return why there is no report of a vehicle yet, by system id."""
-        found = {}
-        for system in self.meters.keys() - self._refused().keys():
-            parts = self._received.get(system, {})
-            if not parts or len(parts) < next(iter(parts.values())).parts:
-                heard = self.meters[system].fingerprint is not None
-                found[system] = "no report was received" if heard else "not heard"
-        return dict(sorted(found.items()))
-
     @property
     def over(self) -> bool:
         """Whether the check has ended."""
@@ -290,7 +267,7 @@ class Preflight:
         if self.phase is Phase.WAIT:
             return f"waiting for {self._lacking(self._now) or 'nothing'}"
         if self.phase is Phase.EXCHANGE:
-            silent = ", ".join(map(str, self._awaited()))
+            silent = ", ".join(map(str, self._exchange.awaited()))
             return f"exchanging reports{f', none of {silent}' if silent else ''}"
         return str(self.phase.value)
 
@@ -304,22 +281,13 @@ class Preflight:
 
     def verdict(self) -> Verdict:
         """Return the verdict on all that was reported."""
-        missing, reports = {**self._refused(), **self._awaited()}, {}
+        terms, exchange = self._terms, self._exchange
+        missing, reports = {**exchange.refused(), **exchange.awaited()}, exchange.reports()
         if self._parts:
-            reports[self._terms.system] = _whole(self._parts)
-        for system, parts in self._received.items():
-            if system not in missing:
-                reports[system] = _whole(list(parts.values()))
-        terms = self._terms
+            reports[terms.system] = whole(self._parts)
         return judge(self._checks, reports, missing, terms.config, terms.origin, terms.seconds)
 
 
 def _millimetres(length: float) -> int:
     """Return ``length`` (m) in mm, rounded up, at most what two bytes hold."""
     return min(ceil(1e3 * length), 65_535)
-
-
-def _whole(parts: list[Report]) -> Report:
-    """Return all parts of a report as one."""
-    ordered = sorted(parts, key=lambda part: part.part)
-    return ordered[0]._replace(links=tuple(link for part in ordered for link in part.links))
