@@ -8,6 +8,9 @@ agreement before it has begun anew.
 
 from __future__ import annotations
 
+import numpy as np
+
+from companion.avoidance.certified.committed import horizon_of
 from companion.avoidance.certified.fingerprint import FleetIdentity
 from companion.avoidance.certified.negotiation import AgreedPlans, Geometry, Negotiation
 from companion.avoidance.certified.pair import Agreement
@@ -15,6 +18,7 @@ from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan, read, stored
 from companion.config.certified import CertifiedConfig
 from companion.errors import CompanionError
+from companion.values.horizon import Array
 from companion.values.refused_senders import RefusedSenders
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.wire.agreements import Entry, Statement
@@ -203,6 +207,20 @@ class Agreements:
     def away(self) -> frozenset[int]:
         """Members whose vehicle another controller flies, which need not keep the agreements."""
         return frozenset(system for system, peer in self._peers.items() if peer.away and peer.left is None)
+
+    def resting(self, since: int, within: float) -> dict[int, Array]:
+        """Return where the newest plan of each peer ends (3,), m, whose plan of ``since`` (µs) was there.
+
+        That is ``within`` this distance (m).
+        """
+        found = {}
+        for system, peer in self._peers.items():
+            newest, then = peer.plans.newest, peer.plans.before(since)
+            if newest is not None and then is not None:
+                end = newest.controls[-1, 2]
+                if np.abs(end - horizon_of(then.plan).at(since).position).max() <= within:
+                    found[system] = end
+        return found
 
     def kept(self) -> dict[int, tuple[Agreement, ...]]:
         """Return the agreements that the own plans keep, by system id, without those of departed vehicles."""

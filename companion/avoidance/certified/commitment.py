@@ -21,6 +21,7 @@ from companion.avoidance.certified.committed import (
     rounding,
 )
 from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.detour import Subgoal
 from companion.avoidance.certified.qp import Objective, SeparationQp, State
 from companion.avoidance.certified.separating_planes import Others, along, planes
 from companion.config.certified import CertifiedConfig
@@ -113,8 +114,10 @@ class Commitment:
         """
         return self._carried()[0]
 
-    def replan(self, objective: Objective, goal: Array, others: Others) -> bool:
+    def replan(self, objective: Objective, goal: Subgoal, others: Others) -> bool:
         """Make the next epoch's plan; return False if none was found and the old plan is carried on.
+
+        ``goal`` is where the progress of the plan's end is measured.
 
         Raises CompanionError without a committed plan.
         """
@@ -139,7 +142,9 @@ class Commitment:
                 moving = objective.moving
                 gradient = self._program.costs[moving].gradient_per_metre
                 seconds = 1e-6 * self._config.epoch_us
-                self._deadlock_turn.learn(points[-1, 2], goal, push, gradient, seconds, moving=moving)
+                self._deadlock_turn.learn(
+                    points[-1, 2], goal.place, push, gradient, seconds, goal.beyond, moving=moving
+                )
                 self.following = plan
                 return True
         self.carry_on(HoldReason.UNSOLVED)

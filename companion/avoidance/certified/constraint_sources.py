@@ -5,7 +5,7 @@ All are given on the plan's own knots.
 
 from __future__ import annotations
 
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from companion.avoidance.certified.committed import horizon_of
 from companion.avoidance.certified.margins import beside, between, fastest, margin
 from companion.avoidance.certified.noncooperative import NonCooperative
 from companion.avoidance.certified.separating_planes import Others
+from companion.avoidance.certified.visibility_graph import Discs
 from companion.config import CompanionConfig
 from companion.config.obstacles import Post
 from companion.obstacles.static import Axes, FixedObstacles
@@ -22,6 +23,14 @@ from companion.world import View, World
 
 _SIGHT_MARGIN_M = 1.0
 """Distance (m) added to the largest one at which an obstacle can constrain a plan."""
+
+_RESTED_US, _AT_REST_M = 2_000_000, 0.5
+"""A vehicle rests if its newest plan ends where it was this time (µs) ago, within this distance (m).
+
+Vehicles that jostle for room rest for a shorter time, and the turn of the goal resolves that.
+"""
+_BESIDE_M = 0.05
+"""Distance (m) of a way from what plans must keep clear of."""
 
 
 class ConstraintSources:
@@ -147,3 +156,31 @@ class ConstraintSources:
             centres[..., :2] = place[:2]
             found.append((centres, np.full(self._steps, self.between)))
         return found
+
+    def resting(self, epoch: int, heights: tuple[float, float], agreements: Agreements) -> list[Discs]:
+        """Return the discs that a way must avoid from ``epoch`` (µs) on; then those that stay for ever alone.
+
+        They are seen from above: where posts, spheres, landed vehicles, and vehicles whose newest plan rests
+        keep a vehicle away whose height is in ``heights`` (m, least and most).
+        """
+        low, high = heights
+        fixed = []
+        for one in self._config.obstacles:
+            above = 0.0 if isinstance(one, Post) else max(one.at[2] - high, low - one.at[2], 0.0)
+            fixed.append((one.at[:2], self._config.field.d_min + one.radius + self._margin, above))
+        landed = [(tuple(last.controls[-1, 2, :2]), self.between, 0.0) for last in agreements.left.values()]
+        vehicles = []
+        for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():
+            if system not in agreements.left:
+                above = 0.0 if self._config.planar else max(end[2] - high, low - end[2], 0.0)
+                vehicles.append((tuple(end[:2]), self.between, above))
+        return [_discs(fixed + landed + vehicles), _discs(fixed + landed)]
+
+
+def _discs(found: list[tuple[tuple[float, ...], float, float]]) -> Discs:
+    """Return the discs of ``found``: centre, radius, and distance above or below, m."""
+    found = [one for one in found if one[2] < one[1]]
+    return Discs(
+        np.array([centre for centre, _, _ in found]).reshape(-1, 2),
+        np.array([sqrt(radius * radius - above * above) + _BESIDE_M for _, radius, above in found]),
+    )

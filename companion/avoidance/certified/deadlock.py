@@ -54,6 +54,16 @@ class DeadlockTurn:
             offset = offset * (self._config.detour / length)
         return position + turned(offset, -self._sense * self.angle)
 
+    @property
+    def stalled(self) -> bool:
+        """Whether there was no progress although the goal was turned by ``bend_more``."""
+        config = self._config
+        return self._waited > config.patience + (config.bend_more - config.bend) / config.slow
+
+    def restart(self) -> None:
+        """Measure progress anew, because the way to the goal is another one."""
+        self._distance, self._best = None, np.inf
+
     def learn(
         self,
         rest: Array,
@@ -61,6 +71,7 @@ class DeadlockTurn:
         push: Array,
         gradient_per_metre: float,
         seconds: float,
+        beyond: float = 0.0,
         *,
         moving: bool = False,
     ) -> None:
@@ -68,13 +79,15 @@ class DeadlockTurn:
 
         The plan ends at rest at ``rest`` (3,), m. ``push`` (3,) is the force F of its planes,
         ``gradient_per_metre`` the gradient of its cost per metre of error. The previous plan was made
-        ``seconds`` ago. ``moving``: the goal moves; the distance from it then does not measure progress, and
-        the turn stays below ``bend``.
+        ``seconds`` ago. ``beyond`` (m): length of the way from ``goal``, if that is a sub-goal.
+        ``moving``: the goal moves; the distance from it then does not measure progress, and the turn stays
+        below ``bend``.
         """
         config = self._config
         offset = goal - rest
-        distance = float(np.sqrt(offset @ offset))
-        direction = offset / max(distance, 1e-6)
+        direct = float(np.sqrt(offset @ offset))
+        distance = direct + beyond
+        direction = offset / max(direct, 1e-6)
         approach_speed = np.inf if self._distance is None else (self._distance - distance) / seconds
         self._distance = distance
         if moving:
@@ -88,7 +101,7 @@ class DeadlockTurn:
         if overtime > 0.0:
             # After ``patience`` without progress, a push back along the turned direction counts, too.
             push_back = max(push_back, -float(push @ turned(direction, -self._sense * self.angle)))
-        pushed = min(max(push_back / (gradient_per_metre * max(distance, _MIN_PULL_DISTANCE_M)), 0.0), 1.0)
+        pushed = min(max(push_back / (gradient_per_metre * max(direct, _MIN_PULL_DISTANCE_M)), 0.0), 1.0)
         pushed *= min(max(1.0 - approach_speed / config.speed, 0.0), 1.0)
         if pushed > config.pushed:
             most = min(config.bend_more, config.bend + config.slow * overtime)

@@ -9,6 +9,7 @@ from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.commitment import Commitment, HoldReason
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.detour import Detour, Subgoal
 from companion.avoidance.certified.fingerprint import identity
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.qp import Objective, SeparationQp
@@ -43,6 +44,7 @@ class CertifiedFlight:
             certified, program, self._deadlock_turn, fleet.fingerprint, planar=config.planar
         )
         self._sources = ConstraintSources(config, steps)
+        self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
         between, planar = self._sources.between, config.planar
         distance = np.full((1, steps + 1), between)
         self.agreements = Agreements(
@@ -175,9 +177,25 @@ class CertifiedFlight:
         own = commitment.own()
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
-        goal = self._deadlock_turn.turned(start.position_m, aim.destination)
+        subgoal = self._subgoal(now, epoch, own[-1, 2], aim.destination)
+        goal = self._deadlock_turn.turned(start.position_m, subgoal.place)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
-        return commitment.replan(objective, aim.destination, others)
+        return commitment.replan(objective, subgoal, others)
+
+    def _subgoal(self, now: int, epoch: int, rest: Array, destination: Array) -> Subgoal:
+        """Return where the plan should end: ``destination`` (3,), m, or a place on a way round to it."""
+        heights = min(rest[2], destination[2]), max(rest[2], destination[2])
+        begun = self._detour.begun
+        subgoal = self._detour.towards(
+            now,
+            rest,
+            destination,
+            lambda: self._sources.resting(epoch, heights, self.agreements),
+            stalled=self._deadlock_turn.stalled,
+        )
+        if self._detour.begun != begun:
+            self._deadlock_turn.restart()
+        return subgoal
 
     def _objective(self, begins: float, aim: Aim, goal: Array, field: Array) -> Objective:
         """Return the preferred places of a plan that begins in ``begins`` s and should end at ``goal`` (3,).

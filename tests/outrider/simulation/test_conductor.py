@@ -88,6 +88,23 @@ def test_converged_is_near_and_slow_and_both_for_a_second() -> None:
     assert run.conductor.failure is None
 
 
+def test_others_converge_without_those_whose_companion_ends_for_good() -> None:
+    faults = [{"kind": "vanish", "vehicle": 12, "at_s": 1.0}]
+    run = Run(scenario("antipodal-8", vehicles=2, airborne=True, cap_s=10.0, faults=faults))
+    assert run.starts.goals is not None
+    run.show(1.0, run.starts.positions)
+    places = np.array([run.starts.goals[0], run.starts.positions[1]])
+    began = run.now + SAMPLE
+    assert run.show(20.0, places)
+    assert run.conductor.others_converged_at == began
+    assert run.conductor.converged_at is None
+    # The first companion lasts: while its vehicle is away, nobody has arrived.
+    run = Run(run.conductor._scenario)
+    run.show(1.0, run.starts.positions)
+    assert run.show(20.0, run.starts.positions)
+    assert run.conductor.others_converged_at is None
+
+
 def test_who_does_not_converge_is_flown_to_the_cap() -> None:
     run = Run(AIRBORNE)
     assert run.show(30.0, run.starts.positions)

@@ -165,6 +165,7 @@ class RealTimeFlight:
             conductor.clock_start,
             conductor.clock_end,
             conductor.converged_at,
+            conductor.others_converged_at,
             conductor.failure,
             [found.tallies or (_NO_TALLY, _NO_TALLY) for found in companions],
             Messages(

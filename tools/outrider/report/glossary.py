@@ -24,6 +24,9 @@ TERMS = {
     "sensors": Term("sensors", "", "sensor profile of the autopilots"),
     "converged": Term("converged", "", "all vehicles in place, and slow, for one second"),
     "convergence_time_s": Term("time to converge", "s", "start of that second, after the goal event"),
+    "others_converge_s": Term(
+        "others converge", "s", "the same without the vehicles whose companion ends for good"
+    ),
     "failure": Term("failure", "", "reason why the flight failed, or vehicles that fell or did not land"),
     "min_separation_m": Term(
         "least separation", "m", "of two vehicles' centres, true, at every physics step"

@@ -40,8 +40,9 @@ class Outcome:
     """A finished flight; times in µs on the clock of the run, None for events that did not occur.
 
     ``clock_start``: goal event, from which the time of the flight counts ("the clock"); ``clock_end``: end of
-    this time, before the landing. ``converged_at``: start of the convergence. ``span`` (m): a vehicle's size
-    from tip to tip. ``tallies``: for each companion its counters at ``clock_start`` and at ``clock_end``.
+    this time, before the landing. ``converged_at``: start of the convergence. ``others_converged_at``:
+    the same without the vehicles whose companion ends for good. ``span`` (m): a vehicle's size from tip to
+    tip. ``tallies``: for each companion its counters at ``clock_start`` and at ``clock_end``.
     ``punctuality`` is that of a real-time run; lock-step has none. ``plan_logs``: per companion, on its own
     clock.
     """
@@ -55,6 +56,7 @@ class Outcome:
     clock_start: int | None
     clock_end: int | None
     converged_at: int | None
+    others_converged_at: int | None
     failure: str | None
     tallies: list[tuple[Tally, Tally]]
     messages: Messages

@@ -44,10 +44,11 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
     simulated = float(everything.time[-1] - everything.time[0]) * 1e-6 if len(everything.time) else 0.0
     converged: bool | None = None
     seconds: float | None = None
+    others: float | None = None
     if scenario.has_goal:
         converged = flight.converged_at is not None
-        if flight.converged_at is not None and start is not None:
-            seconds = round((flight.converged_at - start) * 1e-6, 3)
+        seconds = _since(start, flight.converged_at)
+        others = _since(start, flight.others_converged_at)
     late = flight.punctuality
     near_target = truth.target.minimum if scenario.d_min_target is not None else float("inf")
     return {
@@ -61,6 +62,7 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "sensors": scenario.sensors,
         "converged": converged,
         "convergence_time_s": seconds,
+        "others_converge_s": others,
         "min_separation_m": _finite(truth.vehicles.minimum),
         "min_obstacle_distance_m": _finite(truth.obstacles.minimum),
         "min_target_distance_m": _finite(near_target),
@@ -100,6 +102,11 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "real_time_factor": round(simulated / cost.wall, 2) if cost.wall > 0 else 0.0,
         "run_dir": None if run_dir is None else str(run_dir),
     }
+
+
+def _since(start: int | None, at: int | None) -> float | None:
+    """Return the time (s) from ``start`` to ``at`` (µs); None if one is missing."""
+    return None if start is None or at is None else round((at - start) * 1e-6, 3)
 
 
 def exit_status(summary: dict[str, Value]) -> int:

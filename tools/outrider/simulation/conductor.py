@@ -13,6 +13,7 @@ import numpy as np
 
 from outrider.runs.formation_error import standoff
 from outrider.runs.ground_truth import Array
+from outrider.scenarios.faults import Vanish
 from outrider.scenarios.scenario import FixedTarget, Scenario
 from outrider.scenarios.starts import Starts
 from outrider.simulation.operator import Operator
@@ -80,6 +81,23 @@ def _intruders(scenario: Scenario) -> list[_Intruder]:
     return sorted(found, key=lambda intruder: intruder.after)
 
 
+class _Arrival:
+    """Arrival of several vehicles: ``at`` (µs) is the first time from which on all stay for ``HOLD``."""
+
+    def __init__(self) -> None:
+        self.at: int | None = None
+        self._since: int | None = None
+
+    def see(self, now: int, *, arrived: bool) -> None:
+        """Record whether all have ``arrived`` at ``now`` (µs)."""
+        if not arrived:
+            self._since = None
+            return
+        self._since = now if self._since is None else self._since
+        if self.at is None and now - self._since >= HOLD:
+            self.at = self._since
+
+
 def _turning_speed(scenario: Scenario) -> float:
     """Return the largest speed (m/s) of a vehicle due to the formation's turn rate; 0 if that is zero."""
     companion = scenario.companion
@@ -104,10 +122,11 @@ class Conductor:
         self.stage = Stage.PREPARE
         self.clock_start: int | None = None
         self.clock_end: int | None = None
-        self.converged_at: int | None = None
         self.failure: str | None = None
         self._calm_since: int | None = None
-        self._near_since: int | None = None
+        self._all, self._others = _Arrival(), _Arrival()
+        vanishing = {fault.vehicle for fault in scenario.faults if isinstance(fault, Vanish)}
+        self._lasting = np.array([s not in vanishing for s in scenario.systems[: scenario.vehicles]])
         self._land_at = 0
         target = scenario.target
         jumps = target.jumps if isinstance(target, FixedTarget) else ()
@@ -116,6 +135,16 @@ class Conductor:
         self._turning = _turning_speed(scenario)
         for k, system in enumerate(scenario.systems):
             operator.take_off(system, float(starts.positions[k, 2]))
+
+    @property
+    def converged_at(self) -> int | None:
+        """Time (µs) from which on all vehicles have arrived."""
+        return self._all.at
+
+    @property
+    def others_converged_at(self) -> int | None:
+        """Time (µs) from which on all vehicles have arrived whose companion does not end for good."""
+        return self._others.at
 
     @property
     def near(self) -> float:
@@ -184,15 +213,11 @@ class Conductor:
         while self._intruders and self._intruders[0].after <= since:
             _, system, goal = self._intruders.popleft()
             self._operator.goal(system, goal)
-        if self._scenario.has_goal and self.converged_at is None and since >= self._last_jump:
-            near = bool((self.errors(sight) < self.near).all())
+        if self._scenario.has_goal and since >= self._last_jump:
             speeds = np.linalg.norm(sight.velocities[: self._scenario.vehicles], axis=1)
-            if near and bool((speeds < SLOW).all()):
-                self._near_since = now if self._near_since is None else self._near_since
-                if now - self._near_since >= HOLD:
-                    self.converged_at = self._near_since
-            else:
-                self._near_since = None
+            arrived = (self.errors(sight) < self.near) & (speeds < SLOW)
+            self._all.see(now, arrived=bool(arrived.all()))
+            self._others.see(now, arrived=bool(self._lasting.any() and arrived[self._lasting].all()))
         over = since >= self._scenario.duration_s * 1e6
         if self.converged_at is not None:
             over = now >= self.converged_at + HOLD + _TIME_AFTER_CONVERGENCE_US

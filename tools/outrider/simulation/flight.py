@@ -114,6 +114,7 @@ class Flight:
             conductor.clock_start,
             conductor.clock_end,
             conductor.converged_at,
+            conductor.others_converged_at,
             conductor.failure,
             list(zip(at_start, at_end, strict=True)),
             Messages(

@@ -197,12 +197,13 @@ class Swarm:
         epoch: int = 200_000,
         strangers: bool = False,
         others: Mapping[int, Mapping[str, object]] | None = None,
+        planar: bool = False,
     ) -> None:
         """``others``: other certified settings of some vehicles, by system id."""
         fleet = tuple(range(1, len(starts) + 1))
         certified = CertifiedConfig(epoch_us=epoch, fleet=() if strangers else fleet)
         self.config = CompanionConfig(
-            task="goto", avoidance="certified", turning_sense="right", certified=certified
+            task="goto", avoidance="certified", turning_sense="right", certified=certified, planar=planar
         )
         self.d = between(self.config.certified, self.config.field, self.config.limits)
         self.vehicles = [

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from companion.avoidance.certified.commitment import Commitment, HoldReason
 from companion.avoidance.certified.committed import carried_on, committed, controls, resting, rests, rounding
 from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.detour import Subgoal
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.separating_planes import Others, hull_distance
@@ -52,7 +53,7 @@ def towards(goal: Array) -> Objective:
 
 
 def replan(kept: Commitment, goal: Array, others: Others = NOBODY) -> bool:
-    return kept.replan(towards(goal), goal, others)
+    return kept.replan(towards(goal), Subgoal(goal, 0.0), others)
 
 
 @given(choices, st.integers(0, 2**16))

@@ -7,6 +7,7 @@ import pytest
 
 from companion.avoidance.certified.commitment import Commitment
 from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.detour import Subgoal
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import LimitsConfig
@@ -32,7 +33,7 @@ def lag(velocity: Array, seconds: float, *, moving: bool = True) -> float:
         begins = 1e-6 * (now + DT - EPOCH)
         places = HERE + (begins + ahead)[:, None] * velocity
         wish = Objective(places, np.broadcast_to(velocity, places.shape), np.zeros_like(places), moving)
-        assert kept.replan(wish, places[-1], NOBODY)
+        assert kept.replan(wish, Subgoal(places[-1], 0.0), NOBODY)
     start = kept.following
     assert start is not None
     return float(np.linalg.norm(start.position_m - (HERE + 1e-6 * (start.epoch - EPOCH) * velocity)))

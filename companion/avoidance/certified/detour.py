@@ -1,0 +1,95 @@
+"""Detour of a vehicle that makes no progress: a way round what rests, with sub-goals along it.
+
+The deadlock turn leads around one obstacle, or several vehicles that move. It does not lead out of a pocket
+of posts and of vehicles that have arrived, which with a least distance of 4.7 m (``gnss``) close gaps of 9 m.
+A vehicle that makes no progress although its goal was turned in full searches a way among the discs that
+posts, landed and resting vehicles cover at its height. It aims along this way until the straight line to its
+goal is free. It keeps to its way while this is free, because two ways of nearly the same length would
+alternate otherwise. Only the cost changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.avoidance.certified.visibility_graph import Discs, free, way, without
+from companion.config.planning import LimitsConfig
+from companion.values.horizon import Array
+
+_EVERY_US = 1_000_000
+"""Shortest time (µs) between two searches, which take some milliseconds among twenty discs."""
+_MOVED_M = 0.5
+"""Distance by which the goal may move before the way is searched anew."""
+
+
+class Subgoal(NamedTuple):
+    """Place (3,), m, to aim for now; ``beyond`` (m): length of the way from there to the goal."""
+
+    place: Array
+    beyond: float
+
+
+class Detour:
+    """Way of one vehicle within the ``limits`` of plans; ``ahead`` (m): least length up to a sub-goal."""
+
+    def __init__(self, limits: LimitsConfig, ahead: float) -> None:
+        self._low, self._high = np.array(limits.box_min[:2]), np.array(limits.box_max[:2])
+        self._ahead = ahead
+        self._way: Array | None = None
+        self._searched = -_EVERY_US
+        self.begun = 0
+        """Number of ways that were begun."""
+
+    def towards(
+        self, now: int, rest: Array, goal: Array, discs: Callable[[], Sequence[Discs]], *, stalled: bool
+    ) -> Subgoal:
+        """Return the sub-goal at ``now`` (µs) of a plan that ends at ``rest`` (3,) so far, towards ``goal``.
+
+        ``stalled``: there is no progress. ``discs`` returns what a way must avoid, in order of preference.
+        Without a way, the sub-goal is the goal.
+        """
+        if self._way is None and not stalled:
+            return Subgoal(goal, 0.0)
+        choices = discs()
+        here, there = rest[:2], goal[:2]
+        if free(here, there[None], without(here, without(there, choices[0])))[0]:
+            self._way = None
+            return Subgoal(goal, 0.0)
+        if not self._still_free(here, there, choices[0]):
+            self._search(now, here, there, choices)
+        return Subgoal(goal, 0.0) if self._way is None else self._along(self._way, rest, goal)
+
+    def _search(self, now: int, here: Array, there: Array, choices: Sequence[Discs]) -> None:
+        if now - self._searched < _EVERY_US:
+            return
+        self._searched = now
+        found = (way(here, there, discs, self._low, self._high) for discs in choices)
+        self._way = next((one for one in found if one is not None), None)
+        self.begun += self._way is not None
+
+    def _still_free(self, here: Array, there: Array, discs: Discs) -> bool:
+        """Return whether the way still leads to ``there``; drop the corners that lie behind."""
+        if self._way is None or np.abs(self._way[-1] - there).max() > _MOVED_M:
+            return False
+        discs = without(here, without(there, discs))
+        seen = np.flatnonzero(free(here, self._way, discs))
+        if not len(seen):
+            return False
+        left = self._way[seen[-1] :]
+        self._way = left
+        return all(free(one, two[None], discs)[0] for one, two in pairwise(left))
+
+    def _along(self, left: Array, rest: Array, goal: Array) -> Subgoal:
+        """Return the place ``ahead`` on the way that is ``left`` (k, 2), or its first corner if further."""
+        corners = np.vstack([rest[:2], left])
+        pieces = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
+        reached = np.concatenate([[0.0], np.cumsum(pieces)])
+        at = min(max(self._ahead, pieces[0]), reached[-1])
+        place = np.array(
+            [np.interp(at, reached, corners[:, 0]), np.interp(at, reached, corners[:, 1]), goal[2]]
+        )
+        return Subgoal(place, float(reached[-1] - at))

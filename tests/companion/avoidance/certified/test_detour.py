@@ -1,0 +1,135 @@
+"""A vehicle without progress goes round what rests: laws of the shortest way, and a pocket that it leaves."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from companion.avoidance.certified.detour import Detour, Subgoal
+from companion.avoidance.certified.visibility_graph import Discs, free, way
+from companion.config.planning import LimitsConfig
+from companion.values.horizon import Array
+from tests.companion.avoidance.certified.plans import EPOCH
+from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+
+LOW, HIGH = np.full(2, -30.0), np.full(2, 30.0)
+NOTHING = Discs(np.empty((0, 2)), np.empty(0))
+
+
+def drawn(seed: int) -> tuple[Array, Array, Discs]:
+    """Start and goal outside of twelve discs, of which several overlap."""
+    random = np.random.default_rng(seed)
+    discs = Discs(random.uniform(-10.0, 10.0, (12, 2)), random.uniform(0.5, 3.5, 12))
+    while True:
+        ends = random.uniform(-12.0, 12.0, (2, 2))
+        if (np.linalg.norm(ends[:, None] - discs.centres, axis=-1) > discs.radii / 0.98).all():
+            return ends[0], ends[1], discs
+
+
+def length(start: Array, corners: Array) -> float:
+    return float(np.linalg.norm(np.diff(np.vstack([start, corners]), axis=0), axis=1).sum())
+
+
+def along(start: Array, corners: Array) -> Array:
+    """Places on the way, a hundred on each piece."""
+    pieces = list(pairwise(np.vstack([start, corners])))
+    return np.concatenate([one + np.linspace(0.0, 1.0, 100)[:, None] * (two - one) for one, two in pieces])
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_way_ends_at_the_goal_and_enters_no_disc(seed: int) -> None:
+    start, goal, discs = drawn(seed)
+    found = way(start, goal, discs, LOW, HIGH)
+    assert found is not None
+    assert (found[-1] == goal).all()
+    off = np.linalg.norm(along(start, found)[:, None] - discs.centres, axis=-1) - discs.radii
+    assert off.min() >= -1e-6
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_way_is_as_long_in_both_directions_and_straight_where_that_is_free(seed: int) -> None:
+    start, goal, discs = drawn(seed)
+    there, back = way(start, goal, discs, LOW, HIGH), way(goal, start, discs, LOW, HIGH)
+    assert there is not None
+    assert back is not None
+    straight = float(np.linalg.norm(goal - start))
+    assert length(start, there) == pytest.approx(length(goal, back))
+    assert (len(there) == 1) == bool(free(start, goal[None], discs)[0])
+    assert length(start, there) >= straight - 1e-9
+    # Fewer discs never make the way longer.
+    fewer = way(start, goal, Discs(discs.centres[:6], discs.radii[:6]), LOW, HIGH)
+    assert fewer is not None
+    assert length(start, fewer) <= length(start, there) * 1.04
+
+
+def test_round_one_disc_the_way_is_near_the_arc_and_its_tangents() -> None:
+    found = way(
+        np.array([-5.0, 0.0]), np.array([5.0, 0.0]), Discs(np.zeros((1, 2)), np.array([3.0])), LOW, HIGH
+    )
+    assert found is not None
+    shortest = 2.0 * (4.0 + 3.0 * (np.pi / 2.0 - np.arccos(0.6)))
+    assert shortest <= length(np.array([-5.0, 0.0]), found) <= 1.04 * shortest
+
+
+def test_out_of_a_closed_ring_there_is_no_way() -> None:
+    angles = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
+    ring = Discs(5.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1), np.full(8, 2.0))
+    assert way(np.zeros(2), np.array([12.0, 0.0]), ring, LOW, HIGH) is None
+    opened = Discs(ring.centres[1:], ring.radii[1:])
+    assert way(np.zeros(2), np.array([12.0, 0.0]), opened, LOW, HIGH) is not None
+    # The box closes the gap of the ring.
+    assert way(np.zeros(2), np.array([-4.0, 9.0]), opened, LOW, np.array([3.0, 30.0])) is None
+
+
+def test_without_a_stall_the_goal_is_the_goal_and_a_free_line_ends_a_way() -> None:
+    limits = LimitsConfig()
+    detour, goal = Detour(limits, 3.0), np.array([8.0, 0.0, 5.0])
+    wall = [Discs(np.array([[4.0, 0.0]]), np.array([2.0]))]
+    rest = np.array([0.0, 0.0, 5.0])
+    assert detour.towards(0, rest, goal, lambda: wall, stalled=False).place is goal
+    aside = detour.towards(0, rest, goal, lambda: wall, stalled=True)
+    assert aside.place[1] != 0.0
+    straight = float(np.linalg.norm(goal - rest))
+    assert float(np.linalg.norm(aside.place - rest)) + aside.beyond > straight
+    # It keeps to the way, also when there is progress again.
+    assert detour.towards(200_000, rest, goal, lambda: wall, stalled=False).place[1] == aside.place[1]
+    assert detour.towards(400_000, rest, goal, lambda: [NOTHING], stalled=False) == Subgoal(goal, 0.0)
+    assert detour.towards(600_000, rest, goal, lambda: wall, stalled=False).place is goal
+
+
+POCKET = np.array(
+    [[-3.0, 2.0], [-3.0, 0.0], [-2.6, -2.0], [-1.0, -3.2], [1.0, -3.2], [2.6, -2.0], [3.0, 0.0], [3.0, 2.0]]
+)
+"""Vehicles that rest, m: the gaps are less than twice the least distance of plans.
+
+The pocket is open to the left of one that flies east; the deadlock turn is to the right, by π at most.
+"""
+
+
+def flown() -> tuple[Swarm, float]:
+    """A vehicle in a pocket of others that rest, whose goal is behind them; its distance at the end, m."""
+    starts = np.array([[0.0, 0.0, 5.0], *([*place, 5.0] for place in POCKET)])
+    goals = starts.copy()
+    goals[0] = 9.0, 0.0, 5.0
+    swarm = Swarm(starts, Rough(delay=20_000), [Habits()] * len(starts), 1, planar=True)
+    gaps = np.linalg.norm(np.diff(POCKET, axis=0), axis=1)
+    assert swarm.d < gaps.min()
+    assert gaps.max() < 2.0 * swarm.d
+    swarm.run(25_000_000, lambda since, system: goals[system - 1])
+    end = swarm.vehicles[0].plan(EPOCH + 25_000_000).positions_m()[0]
+    return swarm, float(np.linalg.norm(end - goals[0]))
+
+
+def test_a_vehicle_leaves_a_pocket_of_vehicles_that_rest() -> None:
+    swarm, off = flown()
+    assert swarm.faults() == []
+    assert off < 0.3
+
+
+def test_without_a_detour_it_stays_in_the_pocket(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        Detour, "towards", lambda _self, _now, _rest, goal, _discs, *, stalled: Subgoal(goal, 0.0)
+    )
+    assert flown()[1] > 3.0
