@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.avoidance.certified.committed import horizon_of, rests
+from companion.avoidance.certified.committed import horizon_of, rest_time, rests
 from companion.config import CompanionConfig
 from companion.estimation.origins import Origins
 from companion.flight.autopilots import Profile, is_guided
@@ -47,7 +47,7 @@ from mavlink_bridge.messages import (
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
-from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.codec import Accept, Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import WirePlan
 from mavlink_bridge.wire.plan import unpack as unpack_plan
@@ -67,6 +67,23 @@ _COMPANION_IDS = frozenset(
     (mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED, mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
 )
 """Message ids that are received on the autopilot's link, by sender."""
+LINKS: Final = ("autopilot", "swarm")
+"""The links of a backup node."""
+
+
+def accepts(link: str, system: int) -> Accept:
+    """Return the header filter of ``link`` for the backup node of ``system``."""
+    if link == "swarm":
+        return lambda identifier, sender, component: (
+            (sender, component) == (system, COMPONENT) and identifier == mavlink.MAVLINK_MSG_ID_TUNNEL
+        )
+    return lambda identifier, sender, component: (
+        sender == system
+        and (
+            (component == mavlink.MAV_COMP_ID_AUTOPILOT1 and identifier in _AUTOPILOT_IDS)
+            or (component == COMPONENT and identifier in _COMPANION_IDS)
+        )
+    )
 
 
 class BackupNode:
@@ -81,26 +98,7 @@ class BackupNode:
         self.name = f"helm-{system}"
         self._config, self._fleet = config, fleet
         self._own = Source(system, BACKUP)
-        self._codecs = {
-            "autopilot": Codec(
-                lambda identifier, sender, component: (
-                    sender == system
-                    and (
-                        (component == mavlink.MAV_COMP_ID_AUTOPILOT1 and identifier in _AUTOPILOT_IDS)
-                        or (component == COMPONENT and identifier in _COMPANION_IDS)
-                    )
-                ),
-                signing,
-            ),
-            "swarm": Codec(
-                lambda identifier, sender, component: (
-                    sender == system
-                    and component == COMPONENT
-                    and identifier == mavlink.MAVLINK_MSG_ID_TUNNEL
-                ),
-                signing,
-            ),
-        }
+        self._codecs = {link: Codec(accepts(link, system), signing) for link in LINKS}
         self._signing = signing
         self._plans: dict[int, WirePlan] = {}
         self._cached_horizon: tuple[WirePlan, Horizon] | None = None
@@ -113,14 +111,31 @@ class BackupNode:
         self.carried = 0
         """Number of set-points sent in place of the companion."""
 
+    @property
+    def steers(self) -> bool:
+        """Whether the companion's last set-point agreed with its plan, and no other controller came since."""
+        return self._received is not None
+
+    def rests(self, now: int, settling: int) -> bool:
+        """Return whether no plan is flown, or it has been at rest for ``settling`` at ``now`` (µs)."""
+        horizon = self._horizon(now) if self._received is not None else None
+        return horizon is None or now >= rest_time(horizon) + settling
+
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Receive messages; while the companion is silent, send the set-point of its plan at ``now`` (µs)."""
-        self._boot = now if self._boot is None else self._boot
         if self._signing is not None:
             self._signing.present(now)
-        for link, data in inbox:
-            for message in self._codecs[link].feed(data, whole=True):
-                self._receive(now, message)
+        messages = [message for link, data in inbox for message in self._codecs[link].feed(data, whole=True)]
+        return self.advance(now, messages)
+
+    def advance(self, now: int, messages: Sequence[Message]) -> list[Datagram]:
+        """Do a step with ``messages`` that were decoded, and whose signatures were checked, elsewhere.
+
+        They are those that ``accepts`` accepts. Signatures continue after the newest stamp of ``signing``.
+        """
+        self._boot = now if self._boot is None else self._boot
+        for message in messages:
+            self._receive(now, message)
         beat = self._heartbeat(now)
         profile = self._profile(now)
         if profile is None:

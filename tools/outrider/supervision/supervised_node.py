@@ -30,6 +30,11 @@ OURS = (Phase.PREPARE, *STEERED, Phase.LAND)
 
 In all other phases, as when another controller has taken over the vehicle, no hold is requested on exit.
 """
+SETTLING_US = 1_000_000
+"""Time for which a committed plan has been at rest before the hold is requested (µs).
+
+The vehicle follows its plan late.
+"""
 _OTHERS = ("swarm", "target")
 
 
@@ -70,6 +75,14 @@ class SupervisedNode:
         if self._duplicates is not None and self._duplicates.seen:
             return DUPLICATE
         return "" if self.settled else CLOCK
+
+    def finish(self) -> None:
+        """Let the companion fly its committed plan to the end, and make no other one."""
+        self.companion.finish()
+
+    def rests(self, now: int) -> bool:
+        """Return whether a companion that finishes has been at rest for ``SETTLING_US`` at ``now`` (µs)."""
+        return self.last is not None or self.companion.rests(now, SETTLING_US)
 
     def give_up(self) -> None:
         """Replace the companion by the hold on exit, which sends no set-points.
