@@ -46,10 +46,13 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import Statement
+from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.codec import Accept, Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import WirePlan
+from mavlink_bridge.wire.plan import pack as pack_plan
 from mavlink_bridge.wire.plan import unpack as unpack_plan
 from mavlink_bridge.wire.signing import Signing
 
@@ -90,11 +93,20 @@ class BackupNode:
     """Backup ``Node`` beside the companion of ``system``, on the same clock.
 
     Links: ``autopilot``, ``swarm``. ``signing`` is the node's own instance, with the companion's key.
+    ``finishes``: a farewell does not mean that the companion lands, because it may say it and fly its last
+    plan to the end (``Companion.finish``).
     """
 
     def __init__(
-        self, config: CompanionConfig, system: int, fleet: FleetFrame, signing: Signing | None = None
+        self,
+        config: CompanionConfig,
+        system: int,
+        fleet: FleetFrame,
+        signing: Signing | None = None,
+        *,
+        finishes: bool = False,
     ) -> None:
+        self._finishes = finishes
         self.name = f"helm-{system}"
         self._config, self._fleet = config, fleet
         self._own = Source(system, BACKUP)
@@ -108,6 +120,7 @@ class BackupNode:
         self._origins = Origins()
         self._next = self._next_beat = 0
         self._boot: int | None = None
+        self._since = 0
         self.carried = 0
         """Number of set-points sent in place of the companion."""
 
@@ -159,6 +172,18 @@ class BackupNode:
         message = setpoint(time, now - self._boot, horizon, yaw, self._local, self._own, mask)
         return [*beat, Datagram("autopilot", self._codecs["autopilot"].encode(message))]
 
+    def farewell(self) -> list[Message]:
+        """Return the newest plan, and the statement that it is the companion's last one.
+
+        To be sent on the swarm link once the companion's process has ended. Nothing without a flown plan.
+        """
+        if self._received is None or not self._plans:
+            return []
+        plan = self._plans[max(self._plans)]
+        statement = Statement(self._fleet.checksum, plan.epoch, self._since, farewell=True)
+        tunnels = (PLAN, pack_plan(plan)), (AGREEMENTS, pack_statement(statement))
+        return [Tunnel(self._own, 0, 0, kind, payload) for kind, payload in tunnels]
+
     def _heartbeat(self, now: int) -> list[Datagram]:
         """Return a heartbeat once a second: routers learn the route from it, and operators see the node."""
         if now < self._next_beat:
@@ -186,8 +211,11 @@ class BackupNode:
     def _store_plan(self, now: int, message: Tunnel) -> None:
         """Store a plan of the companion; discard all plans on a farewell, after which the companion lands."""
         try:
-            if message.payload_type == AGREEMENTS and unpack_statement(message.payload).farewell:
-                self._forget()
+            if message.payload_type == AGREEMENTS:
+                statement = unpack_statement(message.payload)
+                self._since = max(self._since, statement.since)
+                if statement.farewell and not self._finishes:
+                    self._forget()
             if message.payload_type != PLAN:
                 return
             plan = unpack_plan(message.payload)

@@ -46,6 +46,10 @@ class FleetTimeBackup:
         """Whether the companion's last set-point agreed with its plan, see ``BackupNode``."""
         return self._node.steers
 
+    def farewell(self) -> list[Message]:
+        """Return the newest plan and the statement that it is the last one, see ``BackupNode.farewell``."""
+        return self._node.farewell()
+
     def rests(self, now: int, settling: int) -> bool:
         """Return whether no plan is flown at ``now`` (µs, own clock), or it has ended, see ``BackupNode``."""
         return self._ahead is None or self._node.rests(now + self._ahead, settling)

@@ -163,9 +163,9 @@ class Companion:
         self._finishing = True
         self.avoidance.finish()
 
-    def rests(self, now: int, settling: int) -> bool:
-        """Return whether no committed plan is flown, or it has been at rest for ``settling`` (µs)."""
-        return not self.pilot.streaming or self.avoidance.rests(now, settling)
+    def rests(self, now: int) -> bool:
+        """Return whether no committed plan is flown, or the flown one is at rest at ``now`` (µs)."""
+        return not self.pilot.streaming or self.avoidance.rests(now)
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Handle the messages that arrived and do what is due at ``now`` (µs)."""

@@ -139,8 +139,8 @@ class Avoidance(Protocol):
         """Make no further plan."""
         ...
 
-    def rests(self, now: int, settling: int) -> bool:
-        """Return whether nothing is flown, or the plan has been at rest for ``settling`` at ``now`` (µs)."""
+    def rests(self, now: int) -> bool:
+        """Return whether nothing is flown, or the committed plan is at rest at ``now`` (µs)."""
         ...
 
     def idle(self, now: int) -> bool:

@@ -96,9 +96,9 @@ class CertifiedAvoidance:
         """Make no further plan: the committed one is flown to its end, and then its last position held."""
         self._finishing = True
 
-    def rests(self, now: int, settling: int) -> bool:
-        """Return whether nothing is flown, or the plan has been at rest for ``settling`` at ``now`` (µs)."""
-        return self.horizon is None or now >= rest_time(self.horizon) + settling
+    def rests(self, now: int) -> bool:
+        """Return whether nothing is flown, or the committed plan is at rest at ``now`` (µs)."""
+        return self.horizon is None or now >= rest_time(self.horizon)
 
     def fly(self, now: int, situation: AvoidanceInputs) -> Array | None:
         """Bring the committed plan up to date.

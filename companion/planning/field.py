@@ -115,7 +115,7 @@ class FieldAvoidance:
     def finish(self) -> None:
         """Do nothing: nobody relies on the end of a plan of the field."""
 
-    def rests(self, now: int, settling: int) -> bool:
+    def rests(self, now: int) -> bool:
         """Return True: no plan has to be flown to its end."""
         return True
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from multiprocessing.connection import wait
+from pathlib import Path
 from typing import Final, NamedTuple
 
 from mavlink_bridge.clocks.clock import Clock
@@ -15,6 +16,7 @@ from outrider.fly.process_channel import Channel, OrderLink, intercom
 from outrider.fly.request import Request
 from outrider.fly.watchdog import Watchdog
 from outrider.fly.wiring import Wiring
+from outrider.runs.names import BACKUP_LOGS
 
 HUNG_S: Final = 5.0
 """Time without a report after which the backup process counts as hung (s)."""
@@ -35,7 +37,8 @@ class Backup:
     """Backup process of one companion process.
 
     ``copies`` is the companion's end of the socket, for its process; ``tell`` receives events in words.
-    ``newest`` returns the signing stamp after which a new process signs.
+    ``newest`` returns the signing stamp after which a new process signs. The logs are written below
+    ``directory``.
     """
 
     def __init__(
@@ -45,7 +48,9 @@ class Backup:
         clock: Clock,
         newest: Callable[[], int],
         tell: Callable[[str, str], None],
+        directory: Path,
     ) -> None:
+        self._directory, self._number = directory, 0
         self._asked, self._wiring, self._clock = asked, wiring, clock
         self._newest, self._tell = newest, tell
         self.copies: CopySender
@@ -61,6 +66,7 @@ class Backup:
 
     def start(self) -> None:
         """Start the process."""
+        self._number += 1
         self._desk, self._orders = intercom()
         worker = BackupWorker(
             self._asked,
@@ -70,6 +76,7 @@ class Backup:
             self._clock,
             self._newest(),
             self.copies,
+            self._directory / BACKUP_LOGS.format(self._number),
         )
         process = self._process = ChildProcess(worker)
         self._tell("process", f"the backup node runs in process {process.start()}")

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.backup_node import LINKS, accepts
 from companion.flight.hold_on_exit import HoldOnExit
+from companion.telemetry.reception import LINKS as COMPANION_LINKS
 from mavlink_bridge.key import Key
 from mavlink_bridge.messages import Heartbeat, Message
 from mavlink_bridge.node import Datagram
@@ -22,6 +23,8 @@ DEAF_US: Final = 300_000
 
 Two readers of one link take each other's messages, so a short delay of the companion must not make another.
 """
+_FAREWELL_US: Final = 100_000
+"""Time between two announcements that the plan is the last one (µs)."""
 _COPIES = "copies"
 
 
@@ -38,6 +41,10 @@ class Backup(Protocol):
         """Whether the companion's last set-point agreed with its plan, and no other controller came since."""
         ...
 
+    def farewell(self) -> list[Message]:
+        """Return the newest plan, and the statement that it is the last one."""
+        ...
+
     def rests(self, now: int, settling: int) -> bool:
         """Return whether no plan is flown, or it has been at rest for ``settling`` at ``now`` (µs)."""
         ...
@@ -51,12 +58,12 @@ class BackupPilot:
     """``Node`` of the backup process of ``system``.
 
     Links: ``copies`` (records of ``backup_copies``) and ``autopilot``, the physical link, to be read only
-    while ``deaf``. ``signing`` is that of ``backup``; ``key``: for the hold request, which has the
-    companion's ids.
+    while ``deaf``; it sends on ``autopilot`` and ``swarm``. ``signing`` is that of ``backup``; ``key``: for
+    the hold request, which has the companion's ids.
 
     ``gone``: set it to True when the companion's process has ended or flies no more. Then the plan is flown
-    to its end at rest, and the hold is requested; ``over`` tells the end of that, ``held`` the result, None
-    if nothing was to be done.
+    to its end at rest, the others are told that it is the last, and the hold is requested; ``over`` tells the
+    end of that, ``held`` the result, None if nothing was to be done.
     """
 
     def __init__(
@@ -74,6 +81,8 @@ class BackupPilot:
             ),
             signing,
         )
+        self._swarm = Codec(None, signing, COMPANION_LINKS.index("swarm"))
+        self._next_farewell = 0
         self._beat: Heartbeat | None = None
         self._heard: int | None = None
         self.deaf = False
@@ -93,6 +102,7 @@ class BackupPilot:
         self.deaf = self.gone or now - self._heard > DEAF_US
         leaving = self._backup.advance(now, messages)
         if self.gone and not self.over:
+            leaving += self._farewell(now)
             leaving += self._end(now, [datagram for datagram in inbox if datagram.link == "autopilot"])
         return leaving
 
@@ -118,6 +128,14 @@ class BackupPilot:
             *swarm.feed(copies.swarm, whole=True),
             *autopilot.feed(copies.autopilot, whole=True),
         ]
+
+    def _farewell(self, now: int) -> list[Datagram]:
+        """Return the announcement that the flown plan is the last, when it is due."""
+        if now < self._next_farewell:
+            return []
+        self._next_farewell = now + _FAREWELL_US
+        data = b"".join(self._swarm.encode(message) for message in self._backup.farewell())
+        return [Datagram("swarm", data)] if data else []
 
     def _end(self, now: int, heard: Sequence[Datagram]) -> list[Datagram]:
         """Return the requests for the hold, once the plan is at rest."""

@@ -6,29 +6,32 @@ import os
 import signal
 import sys
 import traceback
+from pathlib import Path
 from typing import Final
 
 from companion.backup_node import BackupNode
 from companion.fleet_time_backup import FleetTimeBackup
 from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link, LinkCounters
-from mavlink_bridge.loops.lockstep import Scheduled
+from mavlink_bridge.loops.lockstep import Direction, Scheduled
 from mavlink_bridge.loops.priority import ask_for_priority, sharpen_timers
 from mavlink_bridge.loops.realtime import RealTime
+from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
-from outrider.fly.backup_copies import CopyLink, CopySender
+from outrider.fly.backup_copies import CopyLink, CopySender, unpack
 from outrider.fly.backup_pilot import Backup, BackupPilot
+from outrider.fly.log import Log
 from outrider.fly.process_channel import OrderLink
 from outrider.fly.request import Request
 from outrider.fly.wiring import Wiring
 from outrider.fly.worker import IGNORED
+from outrider.runs import names
 
-KEPT: Final = ("autopilot",)
+KEPT: Final = ("autopilot", "swarm")
 """Links whose serial ports stay open in the parent and in the backup process.
 
 A serial port cannot be opened a second time.
 """
-_PERIOD_US: Final = 10_000
 _REPORT_US: Final = 500_000
 """Time between two reports to the parent (µs)."""
 
@@ -39,7 +42,8 @@ class BackupWorker:
     ``wiring``: the open links, of which the autopilot's is used. ``copies``: what the companion copies.
     ``orders``: channel to the parent, whose stop request means that the companion is gone. ``clock``: the
     companion's. ``newest``: signing stamp after which it signs. ``sender``: the companion's end of the
-    socket of ``copies``, which is closed in this process.
+    socket of ``copies``, which is closed in this process. What the companion and the backup node send on the
+    swarm link is logged in ``directory``: the log of a companion that is killed lacks its last messages.
     """
 
     def __init__(
@@ -51,8 +55,9 @@ class BackupWorker:
         clock: Clock,
         newest: int,
         sender: CopySender,
+        directory: Path,
     ) -> None:
-        self._sender = sender
+        self._sender, self._directory = sender, directory
         self._asked, self._wiring, self._copies = asked, wiring, copies
         self._orders, self._clock, self._newest = orders, clock, newest
         self._parent = os.getpid()
@@ -66,7 +71,8 @@ class BackupWorker:
         else:
             sharpen_timers()
         try:
-            self._run()
+            with Log(self._directory, self._asked.system, self._report_error) as log:
+                self._run(log)
         except Exception as error:
             if os.environ.get("OUTRIDER_TRACEBACK"):
                 traceback.print_exc()
@@ -74,7 +80,10 @@ class BackupWorker:
             sys.exit(3)
         sys.exit(0)
 
-    def _run(self) -> None:
+    def _report_error(self, text: str) -> None:
+        self._orders.tell(kind="fault", text=text)
+
+    def _run(self, log: Log) -> None:
         asked, orders = self._asked, self._orders
         signing = None if asked.key is None else Signing(asked.key)
         if signing is not None:
@@ -100,13 +109,15 @@ class BackupWorker:
             return pilot.over
 
         loop = RealTime(
-            Scheduled(pilot, _PERIOD_US),
+            Scheduled(pilot, asked.config.period_us),
             {
                 "copies": self._copies,
                 "autopilot": _WhenDeaf(self._wiring.physical("autopilot"), pilot),
+                "swarm": _SendOnly(self._wiring.physical("swarm")),
                 "orders": orders,
             },
             self._clock,
+            taps=(_SwarmTap(log, asked.system),),
         )
         loop.run(lambda: False, stepped)
         held = pilot.held
@@ -122,8 +133,54 @@ def backup_of(asked: Request, signing: Signing | None) -> Backup:
     """Return the backup node of the companion that ``asked`` describes; it signs with ``signing``."""
     config, system, frame = asked.config.settings, asked.system, asked.config.origin.frame
     if config.certified.fleet_time == "own":
-        return BackupNode(config, system, frame, signing)
-    return FleetTimeBackup(system, lambda: BackupNode(config, system, frame, signing), signing)
+        return BackupNode(config, system, frame, signing, finishes=True)
+    return FleetTimeBackup(system, lambda: BackupNode(config, system, frame, signing, finishes=True), signing)
+
+
+class _SendOnly:
+    """``Link`` that is never read, because the companion reads it."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+
+    @property
+    def counters(self) -> LinkCounters:
+        """Counters of the physical link."""
+        return self._link.counters
+
+    def fileno(self) -> None:
+        """Return None: nothing is received."""
+
+    def receive(self) -> list[bytes]:
+        """Return an empty list."""
+        return []
+
+    def send(self, data: bytes) -> None:
+        """Send ``data``."""
+        self._link.send(data)
+
+    def close(self) -> None:
+        """Close the physical link in this process."""
+        self._link.close()
+
+
+class _SwarmTap:
+    """Observer that logs as the companion's what it and its backup node send on the swarm link."""
+
+    def __init__(self, log: Log, system: int) -> None:
+        self._log, self._name = log, names.companion(system)
+
+    def begin(self, now: int, node: str, /) -> None:
+        """Do nothing: the times of steps are not needed."""
+
+    def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
+        """Log ``datagram`` if it is sent on the swarm link, or holds copies of what is."""
+        if datagram.link == "copies":
+            data = unpack(datagram.data).swarm
+        else:
+            data = datagram.data if (datagram.link, direction) == ("swarm", "out") else b""
+        if data:
+            self._log(now, self._name, "out", Datagram("swarm", data))
 
 
 class _WhenDeaf:

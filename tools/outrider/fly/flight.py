@@ -161,7 +161,7 @@ class Flight:
         wiring, copies = self._wiring, None
         if self._certified:
             self._backup = Backup(
-                self.asked, wiring, self._wall, lambda: self.state.stamp, self.event_log.note
+                self.asked, wiring, self._wall, lambda: self.state.stamp, self.event_log.note, place
             )
             copies = self._backup.copies
         worker = Worker(

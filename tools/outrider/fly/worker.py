@@ -142,14 +142,14 @@ class Worker:
             alone = os.getppid() != self._parent or self._orders.alone
             if certified and (alone or self._orders.stop):
                 supervised.finish()
-            if alone and (not certified or supervised.rests(now)):
+            if alone and (not certified or supervised.rested):
                 supervised.give_up()
             if isinstance(node, DryRun):
                 for message in node.would:
                     departures.take(now, message)
                 node.would.clear()
             news.look(now, wall.now())
-            if certified and self._orders.stop and supervised.rests(now):
+            if certified and self._orders.stop and supervised.rested:
                 return True
             return supervised.last is not None and supervised.last.over
 

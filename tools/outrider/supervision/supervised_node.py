@@ -61,6 +61,7 @@ class SupervisedNode:
         self._gate = TakeoffInhibit(companion.system, signing)
         self._warned = False
         self._stamp = 0
+        self._rests_for = self._stepped = 0
         self.settled = followed is None or followed.known
         """Whether the rate of the own clock is known."""
 
@@ -80,9 +81,10 @@ class SupervisedNode:
         """Let the companion fly its committed plan to the end, and make no other one."""
         self.companion.finish()
 
-    def rests(self, now: int) -> bool:
-        """Return whether a companion that finishes has been at rest for ``SETTLING_US`` at ``now`` (µs)."""
-        return self.last is not None or self.companion.rests(now, SETTLING_US)
+    @property
+    def rested(self) -> bool:
+        """Whether the companion flies nothing, or its plan has been at rest for ``SETTLING_US``."""
+        return self.last is not None or self._rests_for >= SETTLING_US
 
     def give_up(self) -> None:
         """Replace the companion by the hold on exit, which sends no set-points.
@@ -114,6 +116,8 @@ class SupervisedNode:
             self._warned = barred == DUPLICATE
             self.companion.reporter.report(Severity.CRITICAL, "Own system id used twice", begins=self._warned)
         leaving = self.companion.step(now, inbox) + answers
+        self._rests_for = self._rests_for + now - self._stepped if self.companion.rests(now) else 0
+        self._stepped = now
         stamp = self.companion.world.stamp
         if self._followed is not None and stamp != self._stamp:
             self._stamp = stamp
