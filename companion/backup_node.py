@@ -172,14 +172,17 @@ class BackupNode:
         message = setpoint(time, now - self._boot, horizon, yaw, self._local, self._own, mask)
         return [*beat, Datagram("autopilot", self._codecs["autopilot"].encode(message))]
 
-    def farewell(self) -> list[Message]:
+    def farewell(self, now: int) -> list[Message]:
         """Return the newest plan, and the statement that it is the companion's last one.
 
-        To be sent on the swarm link once the companion's process has ended. Nothing without a flown plan.
+        To be sent on the swarm link once the companion's process has ended. Nothing without a flown plan, and
+        before the newest one has begun at ``now`` (µs) by the clocks of all.
         """
         if self._received is None or not self._plans:
             return []
         plan = self._plans[max(self._plans)]
+        if now < plan.epoch + 2 * self._config.certified.clock_us:
+            return []
         statement = Statement(self._fleet.checksum, plan.epoch, self._since, farewell=True)
         tunnels = (PLAN, pack_plan(plan)), (AGREEMENTS, pack_statement(statement))
         return [Tunnel(self._own, 0, 0, kind, payload) for kind, payload in tunnels]

@@ -46,9 +46,9 @@ class FleetTimeBackup:
         """Whether the companion's last set-point agreed with its plan, see ``BackupNode``."""
         return self._node.steers
 
-    def farewell(self) -> list[Message]:
+    def farewell(self, now: int) -> list[Message]:
         """Return the newest plan and the statement that it is the last one, see ``BackupNode.farewell``."""
-        return self._node.farewell()
+        return [] if self._ahead is None else self._node.farewell(now + self._ahead)
 
     def rests(self, now: int, settling: int) -> bool:
         """Return whether no plan is flown at ``now`` (µs, own clock), or it has ended, see ``BackupNode``."""

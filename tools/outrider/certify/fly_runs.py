@@ -51,6 +51,11 @@ def logs_of(runs: Iterable[FlyRun]) -> dict[int, list[Path]]:
     return found
 
 
+def is_of_backup(log: Path) -> bool:
+    """Return whether ``log`` is that of a backup node."""
+    return log.parent.name.startswith(names.BACKUP_LOGS.format(""))
+
+
 def terms_of_runs(runs: Sequence[FlyRun]) -> Terms:
     """Return the terms on which the companions agree. Raises InputError if two of them do not."""
     terms = [(run, _terms(run.config)) for run in runs]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from heapq import merge
+from operator import itemgetter
 from pathlib import Path
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -13,7 +14,7 @@ from companion.avoidance.certified.margins import between
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Tunnel
-from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.tlog.log import Record, read_tlog
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.codec import Codec
@@ -30,7 +31,7 @@ from outrider.certify.evidence import (
     Terms,
     UnreadablePayloads,
 )
-from outrider.certify.fly_runs import fly_runs, logs_of, terms_of_runs
+from outrider.certify.fly_runs import fly_runs, is_of_backup, logs_of, terms_of_runs
 from outrider.errors import Fault, InputError
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION, resolved
@@ -41,6 +42,12 @@ _ALLOWED = (
     "allowed: what outrider swarm SCENARIO --avoidance certified --out leaves, "
     "or a directory with runs of outrider fly with companion.avoidance certified"
 )
+_LAG_US = 500_000
+"""Time by which the records of a backup node are moved behind those of its companion.
+
+It logs copies of what the companion sends. Only those count that a companion's own log lacks, because it was
+killed.
+"""
 _REPEATED_US = 1_000_000
 """Largest difference of the times at which two processes of one companion log the same frame."""
 _RECORDS_PER_REPORT = 4096
@@ -184,7 +191,9 @@ def _read(owner: int, paths: Sequence[Path], at: Callable[[int], None]) -> Log:
     tally, repeated = _Tally(owner), _Repeated()
     codec = Codec(lambda identifier, _system, _component: identifier == mavlink.MAVLINK_MSG_ID_TUNNEL)
     readers, size = [read_tlog(path) for path in paths], 0
-    for number, record in enumerate(merge(*readers, key=lambda record: record.time)):
+    lags = [_LAG_US if is_of_backup(path) else 0 for path in paths]
+    shifted = [_timed(reader, lag) for reader, lag in zip(readers, lags, strict=True)]
+    for number, (_, record) in enumerate(merge(*shifted, key=itemgetter(0))):
         size += 8 + len(record.frame)
         if number % _RECORDS_PER_REPORT == 0:
             at(size)
@@ -196,6 +205,12 @@ def _read(owner: int, paths: Sequence[Path], at: Callable[[int], None]) -> Log:
             tally.add(number, record.time, message)
     reports = [reader.report for reader in readers]
     return tally.log(sum(report.bad + report.truncated for report in reports) + codec.counters.bad)
+
+
+def _timed(records: Iterable[Record], lag: int) -> Iterator[tuple[int, Record]]:
+    """Yield ``records``, each with its time plus ``lag`` (µs)."""
+    for record in records:
+        yield record.time + lag, record
 
 
 class _Repeated:

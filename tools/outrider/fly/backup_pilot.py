@@ -41,7 +41,7 @@ class Backup(Protocol):
         """Whether the companion's last set-point agreed with its plan, and no other controller came since."""
         ...
 
-    def farewell(self) -> list[Message]:
+    def farewell(self, now: int) -> list[Message]:
         """Return the newest plan, and the statement that it is the last one."""
         ...
 
@@ -134,7 +134,7 @@ class BackupPilot:
         if now < self._next_farewell:
             return []
         self._next_farewell = now + _FAREWELL_US
-        data = b"".join(self._swarm.encode(message) for message in self._backup.farewell())
+        data = b"".join(self._swarm.encode(message) for message in self._backup.farewell(now))
         return [Datagram("swarm", data)] if data else []
 
     def _end(self, now: int, heard: Sequence[Datagram]) -> list[Datagram]:

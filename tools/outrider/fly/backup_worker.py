@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import traceback
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -71,6 +72,8 @@ class BackupWorker:
         else:
             sharpen_timers()
         try:
+            with suppress(OSError):
+                self._directory.mkdir(parents=True)
             with Log(self._directory, self._asked.system, self._report_error) as log:
                 self._run(log)
         except Exception as error:
