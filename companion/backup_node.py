@@ -23,6 +23,7 @@ import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.committed import horizon_of, rest_time, rests
+from companion.avoidance.certified.fingerprint import fingerprint
 from companion.config import CompanionConfig
 from companion.estimation.origins import Origins
 from companion.flight.autopilots import Profile, is_guided
@@ -183,7 +184,7 @@ class BackupNode:
         plan = self._plans[max(self._plans)]
         if now < plan.epoch + 2 * self._config.certified.clock_us:
             return []
-        statement = Statement(self._fleet.checksum, plan.epoch, self._since, farewell=True)
+        statement = Statement(fingerprint(self._config, self._fleet), plan.epoch, self._since, farewell=True)
         tunnels = (PLAN, pack_plan(plan)), (AGREEMENTS, pack_statement(statement))
         return [Tunnel(self._own, 0, 0, kind, payload) for kind, payload in tunnels]
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from companion.avoidance.certified.fingerprint import identity
 from companion.avoidance.certified.margins import between
 from outrider.certify.evidence import Terms
 from outrider.errors import Fault, InputError
@@ -82,7 +83,7 @@ def _terms(config: FlyConfig) -> Terms:
         certified.dt_us,
         certified.epoch_us,
         companion.horizon.steps + 1,
-        config.origin.frame.checksum,
+        identity(companion, config.origin.frame),
         between(certified, companion.field, companion.limits),
         (x, y, z),
         companion.planar,
