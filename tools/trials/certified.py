@@ -40,7 +40,7 @@ from trials.station import listener
 
 PATIENCE: Final = 90.0
 """Wall time after which an expected event is given up (s)."""
-TURN_S: Final = 12.0
+TURN_S: Final = 20.0
 """Time between two goals (s)."""
 ARRIVED_M: Final = 1.5
 """Distance (m) within which a goal counts as reached."""
@@ -98,7 +98,7 @@ class CertifiedFlight:
         began = time.monotonic()
         killed, stopped = self.plan.random.sample(list(systems), 2)
         self._at(self.plan.random.uniform(1.0, TURN_S), lambda: self._kill(killed))
-        self._at(self.plan.random.uniform(1.0, 2 * TURN_S), lambda: self._stop(stopped))
+        self._at(self.plan.random.uniform(1.0, TURN_S), lambda: self._stop(stopped))
         while (passed := time.monotonic() - began) < self.plan.seconds:
             if passed >= TURN_S * (self._turn + 1):
                 self._turn += 1

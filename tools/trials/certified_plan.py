@@ -38,7 +38,7 @@ class CertifiedPlan:
     offset_ms: float = 5000.0
     drift_ppm: float = 50.0
     victims: tuple[str, ...] = PROCESSES
-    seconds: float = 40.0
+    seconds: float = 45.0
     """Time from the first goals to the end (s)."""
     d_min: float = 0.5
     random: Random = field(init=False, compare=False, repr=False)

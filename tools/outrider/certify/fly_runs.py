@@ -24,8 +24,9 @@ class FlyRun(NamedTuple):
 
     @property
     def logs(self) -> list[Path]:
-        """Its logs: of all its companion processes and their backup nodes."""
-        return sorted(self.directory.rglob(names.log(self.config.system)))
+        """Its logs: of all companion processes and their backup nodes, the first process first."""
+        found = self.directory.rglob(names.log(self.config.system))
+        return sorted(found, key=lambda log: (len(log.parts), log))
 
 
 def fly_runs(directory: Path) -> list[FlyRun]:
