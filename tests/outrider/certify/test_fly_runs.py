@@ -71,9 +71,8 @@ def split(flown: Path, place: Path, share: float) -> tuple[Path, Path]:
     run = as_fly(flown, place)
     log = next((run / "fly-12").glob("vehicle-12.tlog"))
     records = list(read_tlog(log))
-    own = [record for record in records if record.frame[5] == 12]
     write(log, records[: round(share * len(records))])
-    late = [record._replace(time=record.time + 8_000) for record in own]
+    late = [record._replace(time=record.time + 8_000) for record in records]
     backup = run / "fly-12" / "backup-1" / log.name
     write(backup, late)
     return run, backup

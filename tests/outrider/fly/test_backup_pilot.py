@@ -88,7 +88,7 @@ class Rig:
                 vehicle += self._trusted.encode(beat)
             autopilot = self._trusted.encode(self._setpoint()) if since % 20_000 == 0 else b""
             swarm = self._trusted.encode(Tunnel(COMPANION, 0, 0, PLAN, pack(self.plan)))
-            inbox.append(Datagram("copies", Copies(0, vehicle, autopilot, swarm).pack()))
+            inbox.append(Datagram("copies", Copies(0, 0, vehicle, autopilot, swarm).pack()))
         elif self.pilot.deaf and self.hears and since % SECOND == 0:
             inbox.append(Datagram("autopilot", self._vehicle.encode(beat)))
         return inbox
@@ -163,7 +163,7 @@ def test_a_plan_that_has_not_begun_is_not_said_to_be_the_last() -> None:
 
 def copied(swarm: Message) -> Datagram:
     codec = Codec()
-    return Datagram("copies", Copies(0, swarm=codec.encode(swarm)).pack())
+    return Datagram("copies", Copies(swarm=codec.encode(swarm)).pack())
 
 
 def test_a_companion_that_hangs_keeps_the_vehicle_and_is_not_replaced() -> None:
@@ -239,7 +239,7 @@ def test_the_stamps_follow_the_companions() -> None:
     rig = Rig(KEY)
     ahead = Signing(KEY)
     ahead.present(BEGIN + 60 * SECOND)
-    rig.pilot.step(rig.now, [Datagram("copies", Copies(ahead.newest).pack())])
+    rig.pilot.step(rig.now, [Datagram("copies", Copies(0, ahead.newest).pack())])
     out = rig.pilot.step(rig.now + 2 * SECOND, [])
     reader = Signing(KEY)
     reader.resume(ahead.newest)
@@ -248,7 +248,7 @@ def test_the_stamps_follow_the_companions() -> None:
 
 def test_copies_arrive_as_they_were_sent_and_the_end_shows() -> None:
     sender, link = copies_pair()
-    records = [Copies(7, b"vehicle", b"", b"swarm"), Copies(2**48 - 1, b"", b"a" * 3000, b"")]
+    records = [Copies(5, 7, b"vehicle", b"", b"swarm"), Copies(2**60, 2**48 - 1, b"", b"a" * 3000, b"")]
     for record in records:
         sender.send(record)
     assert [unpack(data) for data in link.receive()] == records
@@ -262,8 +262,8 @@ def test_copies_arrive_as_they_were_sent_and_the_end_shows() -> None:
 def test_a_record_that_nobody_reads_is_lost_and_holds_up_nothing() -> None:
     sender, link = copies_pair()
     for _ in range(5_000):
-        sender.send(Copies(0, b"", b"a" * 1000, b""))
-    sender.send(Copies(0, b"a" * 70_000))
+        sender.send(Copies(autopilot=b"a" * 1000))
+    sender.send(Copies(vehicle=b"a" * 70_000))
     assert len(link.receive()) > 100
     link.close()
     sender.send(Copies())

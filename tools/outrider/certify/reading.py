@@ -45,8 +45,8 @@ _ALLOWED = (
 _LAG_US = 500_000
 """Time by which the records of a backup node are moved behind those of its companion.
 
-It logs copies of what the companion sends. Only those count that a companion's own log lacks, because it was
-killed.
+It logs copies of what the companion receives and sends. Only those count that a companion's own log lacks,
+because it was killed.
 """
 _REPEATED_US = 1_000_000
 """Largest difference of the times at which two processes of one companion log the same frame."""
@@ -200,7 +200,7 @@ def _read(owner: int, paths: Sequence[Path], at: Callable[[int], None]) -> Log:
         for message in codec.feed(record.frame):
             if not isinstance(message, Tunnel):
                 continue
-            if len(paths) > 1 and message.source.system == owner and repeated(record.time, record.frame):
+            if len(paths) > 1 and repeated(record.time, record.frame):
                 continue
             tally.add(number, record.time, message)
     reports = [reader.report for reader in readers]

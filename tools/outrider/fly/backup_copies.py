@@ -14,40 +14,43 @@ from typing import Final, NamedTuple
 
 from mavlink_bridge.links.link import BURST, LinkCounters
 
-_HEADER: Final = Struct("<QHHH")
+_HEADER: Final = Struct("<QQHHHH")
 _MAX_RECORD_BYTES: Final = 65536
 _BUFFER_BYTES: Final = 1 << 20
 
 
 class Copies(NamedTuple):
-    """Record of one step.
+    """Record of the step at ``time`` (µs).
 
     ``stamp``: the companion's newest signing stamp (10 µs since 2015). ``vehicle``: frames of the autopilot,
-    without signatures. ``autopilot``, ``swarm``: frames that the companion sends on these links.
+    without signatures. ``autopilot``, ``swarm``: frames that the companion sends on these links. ``heard``:
+    what arrived on the swarm link, as it is, only for the log.
     """
 
+    time: int = 0
     stamp: int = 0
     vehicle: bytes = b""
     autopilot: bytes = b""
     swarm: bytes = b""
+    heard: bytes = b""
 
     def pack(self) -> bytes:
         """Return the record as bytes. Raises ValueError for a part that is too long."""
-        parts = self.vehicle, self.autopilot, self.swarm
+        parts = self.vehicle, self.autopilot, self.swarm, self.heard
         try:
-            return _HEADER.pack(self.stamp, *map(len, parts)) + b"".join(parts)
+            return _HEADER.pack(self.time, self.stamp, *map(len, parts)) + b"".join(parts)
         except StructError as error:
             raise ValueError(f"a record does not fit: {error}") from None
 
 
 def unpack(data: bytes) -> Copies:
     """Return the record of ``data``, as ``Copies.pack`` has made it."""
-    stamp, *sizes = _HEADER.unpack_from(data)
+    time, stamp, *sizes = _HEADER.unpack_from(data)
     parts, at = [], _HEADER.size
     for size in sizes:
         parts.append(data[at : at + size])
         at += size
-    return Copies(stamp, *parts)
+    return Copies(time, stamp, *parts)
 
 
 def copies_pair() -> tuple[CopySender, CopyLink]:

@@ -43,8 +43,8 @@ class BackupWorker:
     ``wiring``: the open links, of which the autopilot's is used. ``copies``: what the companion copies.
     ``orders``: channel to the parent, whose stop request means that the companion is gone. ``clock``: the
     companion's. ``newest``: signing stamp after which it signs. ``sender``: the companion's end of the
-    socket of ``copies``, which is closed in this process. What the companion and the backup node send on the
-    swarm link is logged in ``directory``: the log of a companion that is killed lacks its last messages.
+    socket of ``copies``, which is closed in this process. What passes on the swarm link is logged in
+    ``directory`` as well: the log of a companion that is killed lacks its last messages.
     """
 
     def __init__(
@@ -168,7 +168,10 @@ class _SendOnly:
 
 
 class _SwarmTap:
-    """Observer that logs as the companion's what it and its backup node send on the swarm link."""
+    """Observer that logs as the companion's what it receives and sends on the swarm link.
+
+    What its backup node sends there is logged in the same way.
+    """
 
     def __init__(self, log: Log, system: int) -> None:
         self._log, self._name = log, names.companion(system)
@@ -177,13 +180,18 @@ class _SwarmTap:
         """Do nothing: the times of steps are not needed."""
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        """Log ``datagram`` if it is sent on the swarm link, or holds copies of what is."""
+        """Log ``datagram`` if it is sent on the swarm link, or the copies that it holds."""
         if datagram.link == "copies":
-            data = unpack(datagram.data).swarm
-        else:
-            data = datagram.data if (datagram.link, direction) == ("swarm", "out") else b""
+            copies = unpack(datagram.data)
+            # A backup process that was stopped reads old copies.
+            self._add(copies.time, "in", copies.heard)
+            self._add(copies.time, "out", copies.swarm)
+        elif (datagram.link, direction) == ("swarm", "out"):
+            self._add(now, "out", datagram.data)
+
+    def _add(self, now: int, direction: Direction, data: bytes) -> None:
         if data:
-            self._log(now, self._name, "out", Datagram("swarm", data))
+            self._log(now, self._name, direction, Datagram("swarm", data))
 
 
 class _WhenDeaf:

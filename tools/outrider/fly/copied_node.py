@@ -48,7 +48,8 @@ class CopiedNode:
                 sent[link] += data
         vehicle = b"".join(self._codec.encode(message) for message in self._heard(now))
         stamp = 0 if self._signing is None else self._signing.newest
-        self._copies.send(Copies(stamp, vehicle, sent["autopilot"], sent["swarm"]))
+        heard = b"".join(datagram.data for datagram in inbox if datagram.link == "swarm")
+        self._copies.send(Copies(now, stamp, vehicle, sent["autopilot"], sent["swarm"], heard))
         return leaving
 
     def _heard(self, now: int) -> list[Message]:
