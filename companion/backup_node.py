@@ -22,7 +22,8 @@ from typing import Final
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.avoidance.certified.committed import horizon_of, rests
+from companion.avoidance.certified.committed import horizon_of, rest_time, rests
+from companion.avoidance.certified.fingerprint import fingerprint
 from companion.config import CompanionConfig
 from companion.estimation.origins import Origins
 from companion.flight.autopilots import Profile, is_guided
@@ -46,10 +47,13 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import Statement
+from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
-from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.codec import Accept, Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import WirePlan
+from mavlink_bridge.wire.plan import pack as pack_plan
 from mavlink_bridge.wire.plan import unpack as unpack_plan
 from mavlink_bridge.wire.signing import Signing
 
@@ -67,40 +71,47 @@ _COMPANION_IDS = frozenset(
     (mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED, mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
 )
 """Message ids that are received on the autopilot's link, by sender."""
+LINKS: Final = ("autopilot", "swarm")
+"""The links of a backup node."""
+
+
+def accepts(link: str, system: int) -> Accept:
+    """Return the header filter of ``link`` for the backup node of ``system``."""
+    if link == "swarm":
+        return lambda identifier, sender, component: (
+            (sender, component) == (system, COMPONENT) and identifier == mavlink.MAVLINK_MSG_ID_TUNNEL
+        )
+    return lambda identifier, sender, component: (
+        sender == system
+        and (
+            (component == mavlink.MAV_COMP_ID_AUTOPILOT1 and identifier in _AUTOPILOT_IDS)
+            or (component == COMPONENT and identifier in _COMPANION_IDS)
+        )
+    )
 
 
 class BackupNode:
     """Backup ``Node`` beside the companion of ``system``, on the same clock.
 
     Links: ``autopilot``, ``swarm``. ``signing`` is the node's own instance, with the companion's key.
+    ``finishes``: a farewell does not mean that the companion lands, because it may say it and fly its last
+    plan to the end (``Companion.finish``).
     """
 
     def __init__(
-        self, config: CompanionConfig, system: int, fleet: FleetFrame, signing: Signing | None = None
+        self,
+        config: CompanionConfig,
+        system: int,
+        fleet: FleetFrame,
+        signing: Signing | None = None,
+        *,
+        finishes: bool = False,
     ) -> None:
+        self._finishes = finishes
         self.name = f"helm-{system}"
         self._config, self._fleet = config, fleet
         self._own = Source(system, BACKUP)
-        self._codecs = {
-            "autopilot": Codec(
-                lambda identifier, sender, component: (
-                    sender == system
-                    and (
-                        (component == mavlink.MAV_COMP_ID_AUTOPILOT1 and identifier in _AUTOPILOT_IDS)
-                        or (component == COMPONENT and identifier in _COMPANION_IDS)
-                    )
-                ),
-                signing,
-            ),
-            "swarm": Codec(
-                lambda identifier, sender, component: (
-                    sender == system
-                    and component == COMPONENT
-                    and identifier == mavlink.MAVLINK_MSG_ID_TUNNEL
-                ),
-                signing,
-            ),
-        }
+        self._codecs = {link: Codec(accepts(link, system), signing) for link in LINKS}
         self._signing = signing
         self._plans: dict[int, WirePlan] = {}
         self._cached_horizon: tuple[WirePlan, Horizon] | None = None
@@ -110,17 +121,35 @@ class BackupNode:
         self._origins = Origins()
         self._next = self._next_beat = 0
         self._boot: int | None = None
+        self._since = 0
         self.carried = 0
         """Number of set-points sent in place of the companion."""
 
+    @property
+    def steers(self) -> bool:
+        """Whether the companion's last set-point agreed with its plan, and no other controller came since."""
+        return self._received is not None
+
+    def rests(self, now: int, settling: int) -> bool:
+        """Return whether no plan is flown, or it has been at rest for ``settling`` at ``now`` (µs)."""
+        horizon = self._horizon(now) if self._received is not None else None
+        return horizon is None or now >= rest_time(horizon) + settling
+
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Receive messages; while the companion is silent, send the set-point of its plan at ``now`` (µs)."""
-        self._boot = now if self._boot is None else self._boot
         if self._signing is not None:
             self._signing.present(now)
-        for link, data in inbox:
-            for message in self._codecs[link].feed(data, whole=True):
-                self._receive(now, message)
+        messages = [message for link, data in inbox for message in self._codecs[link].feed(data, whole=True)]
+        return self.advance(now, messages)
+
+    def advance(self, now: int, messages: Sequence[Message]) -> list[Datagram]:
+        """Do a step with ``messages`` that were decoded, and whose signatures were checked, elsewhere.
+
+        They are those that ``accepts`` accepts. Signatures continue after the newest stamp of ``signing``.
+        """
+        self._boot = now if self._boot is None else self._boot
+        for message in messages:
+            self._receive(now, message)
         beat = self._heartbeat(now)
         profile = self._profile(now)
         if profile is None:
@@ -143,6 +172,21 @@ class BackupNode:
         mask = profile.setpoint_mask
         message = setpoint(time, now - self._boot, horizon, yaw, self._local, self._own, mask)
         return [*beat, Datagram("autopilot", self._codecs["autopilot"].encode(message))]
+
+    def farewell(self, now: int) -> list[Message]:
+        """Return the newest plan, and the statement that it is the companion's last one.
+
+        To be sent on the swarm link once the companion's process has ended. Nothing without a flown plan, and
+        before the newest one has begun at ``now`` (µs) by the clocks of all.
+        """
+        if self._received is None or not self._plans:
+            return []
+        plan = self._plans[max(self._plans)]
+        if now < plan.epoch + 2 * self._config.certified.clock_us:
+            return []
+        statement = Statement(fingerprint(self._config, self._fleet), plan.epoch, self._since, farewell=True)
+        tunnels = (PLAN, pack_plan(plan)), (AGREEMENTS, pack_statement(statement))
+        return [Tunnel(self._own, 0, 0, kind, payload) for kind, payload in tunnels]
 
     def _heartbeat(self, now: int) -> list[Datagram]:
         """Return a heartbeat once a second: routers learn the route from it, and operators see the node."""
@@ -171,8 +215,11 @@ class BackupNode:
     def _store_plan(self, now: int, message: Tunnel) -> None:
         """Store a plan of the companion; discard all plans on a farewell, after which the companion lands."""
         try:
-            if message.payload_type == AGREEMENTS and unpack_statement(message.payload).farewell:
-                self._forget()
+            if message.payload_type == AGREEMENTS:
+                statement = unpack_statement(message.payload)
+                self._since = max(self._since, statement.since)
+                if statement.farewell and not self._finishes:
+                    self._forget()
             if message.payload_type != PLAN:
                 return
             plan = unpack_plan(message.payload)

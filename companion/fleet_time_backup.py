@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pymavlink.dialects.v20 import all as mavlink
-
-from companion.backup_node import BackupNode
-from companion.values.components import COMPONENT
+from companion.backup_node import LINKS, BackupNode, accepts
 from mavlink_bridge.errors import PlanWireError
-from mavlink_bridge.messages import GpsGlobalOrigin, Tunnel
+from mavlink_bridge.messages import GpsGlobalOrigin, Message, Tunnel
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.fleet_time import PAYLOAD_TYPE, unpack
@@ -22,9 +19,10 @@ _JUMP_US = 50_000
 class FleetTimeBackup:
     """Backup ``Node`` of ``system`` whose plans are in the fleet time that its companion reports.
 
-    ``make`` returns a new ``BackupNode``; ``signing`` is this node's own instance. The backup node is stepped
-    in fleet time, once that is known. When fleet time jumps, a new one begins, because all that the old one
-    dated is in another time. A jump happens only before the companion has announced a plan.
+    ``make`` returns a new ``BackupNode`` that signs with ``signing``, which is not the companion's instance.
+    The backup node is stepped in fleet time, once that is known. When fleet time jumps, a new one begins,
+    because all that the old one dated is in another time. A jump happens only before the companion has
+    announced a plan.
     """
 
     def __init__(self, system: int, make: Callable[[], BackupNode], signing: Signing | None = None) -> None:
@@ -33,23 +31,9 @@ class FleetTimeBackup:
         self._ahead: int | None = None
         self._carried = 0
         self._signing = signing
-        self._codecs = {
-            "autopilot": Codec(
-                lambda identifier, sender, component: (
-                    (sender, component) == (system, mavlink.MAV_COMP_ID_AUTOPILOT1)
-                    and identifier == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN
-                ),
-                signing,
-            ),
-            "swarm": Codec(
-                lambda identifier, sender, component: (
-                    (sender, component) == (system, COMPONENT) and identifier == mavlink.MAVLINK_MSG_ID_TUNNEL
-                ),
-                signing,
-            ),
-        }
-        # The last datagram with the autopilot's origin, which may not come again, for the next backup node.
-        self._origin: Datagram | None = None
+        self._codecs = {link: Codec(accepts(link, system), signing) for link in LINKS}
+        # The autopilot's last origin, which may not come again, for the next backup node.
+        self._origin: GpsGlobalOrigin | None = None
         self._begins = True
 
     @property
@@ -57,21 +41,38 @@ class FleetTimeBackup:
         """Number of set-points that were sent in the companion's place."""
         return self._carried + self._node.carried
 
+    @property
+    def steers(self) -> bool:
+        """Whether the companion's last set-point agreed with its plan, see ``BackupNode``."""
+        return self._node.steers
+
+    def farewell(self, now: int) -> list[Message]:
+        """Return the newest plan and the statement that it is the last one, see ``BackupNode.farewell``."""
+        return [] if self._ahead is None else self._node.farewell(now + self._ahead)
+
+    def rests(self, now: int, settling: int) -> bool:
+        """Return whether no plan is flown at ``now`` (µs, own clock), or it has ended, see ``BackupNode``."""
+        return self._ahead is None or self._node.rests(now + self._ahead, settling)
+
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Step the backup node at ``now`` (µs, own clock); before fleet time is known nothing happens."""
         if self._signing is not None:
             self._signing.present(now)
-        for datagram in inbox:
-            for message in self._codecs[datagram.link].feed(datagram.data, whole=True):
-                if isinstance(message, Tunnel) and message.payload_type == PAYLOAD_TYPE:
-                    self._receive(message.payload)
-                elif isinstance(message, GpsGlobalOrigin):
-                    self._origin = datagram
+        messages = [message for link, data in inbox for message in self._codecs[link].feed(data, whole=True)]
+        return self.advance(now, messages)
+
+    def advance(self, now: int, messages: Sequence[Message]) -> list[Datagram]:
+        """Do a step at ``now`` (µs, own clock) with ``messages``, see ``BackupNode.advance``."""
+        for message in messages:
+            if isinstance(message, Tunnel) and message.payload_type == PAYLOAD_TYPE:
+                self._receive(message.payload)
+            elif isinstance(message, GpsGlobalOrigin):
+                self._origin = message
         if self._ahead is None:
             return []
         earlier = [] if self._origin is None or not self._begins else [self._origin]
         self._begins = False
-        return self._node.step(now + self._ahead, [*earlier, *inbox])
+        return self._node.advance(now + self._ahead, [*earlier, *messages])
 
     def _receive(self, payload: bytes) -> None:
         """Take the companion's fleet time; one that it does not know changes nothing."""

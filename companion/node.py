@@ -102,7 +102,7 @@ class Companion:
         )
         self.health = self._checks.monitor
         self._reports_on = config.ground_messages.texts or config.ground_messages.values
-        self._started = False
+        self._started = self._finishing = False
 
     @property
     def system(self) -> int:
@@ -158,6 +158,15 @@ class Companion:
         self.avoidance.shed()
         return self._times.shed()
 
+    def finish(self) -> None:
+        """Make no further committed plan: fly the last one to its end, and announce it as the last."""
+        self._finishing = True
+        self.avoidance.finish()
+
+    def rests(self, now: int) -> bool:
+        """Return whether no committed plan is flown, or the flown one is at rest at ``now`` (µs)."""
+        return not self.pilot.streaming or self.avoidance.rests(now)
+
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Handle the messages that arrived and do what is due at ``now`` (µs)."""
         if not self._started:
@@ -180,7 +189,7 @@ class Companion:
         shared = NOTHING_SHARED
         if now >= self._sharing.next_due:
             shared = self._sharing.due(now, view, self.avoidance.shared(now, view), self.world.doubt)
-        leaving = self.pilot.phase in (Phase.LAND, Phase.DONE)
+        leaving = self.pilot.phase in (Phase.LAND, Phase.DONE) or (self._finishing and self.pilot.streaming)
         announced = self.avoidance.messages(now, farewell=leaving)
         autopilot = [*commands, *requests, *setpoints, *shared.autopilot]
         swarm, ground = [*shared.swarm, *announced], answers

@@ -121,6 +121,11 @@ class World:
         elif link == "autopilot" and message.source.system == self._system:
             self._receive_own(now, message)
 
+    @property
+    def origin(self) -> tuple[float, float, float] | None:
+        """The autopilot's origin: latitude and longitude (deg), altitude (m); None before it is received."""
+        return self._origin
+
     def at(self, now: int) -> View:
         """Return the view at ``now`` (µs)."""
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None

@@ -135,6 +135,14 @@ class Avoidance(Protocol):
         """
         ...
 
+    def finish(self) -> None:
+        """Make no further plan."""
+        ...
+
+    def rests(self, now: int) -> bool:
+        """Return whether nothing is flown, or the committed plan is at rest at ``now`` (µs)."""
+        ...
+
     def idle(self, now: int) -> bool:
         """Return whether nothing is to be planned or sent at ``now`` (µs)."""
         ...

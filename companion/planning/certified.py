@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from companion.avoidance.certified.commitment import HoldReason
+from companion.avoidance.certified.committed import rest_time
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.field.plan_log import PlanLog
 from companion.config import CompanionConfig
@@ -48,6 +49,7 @@ class CertifiedAvoidance:
         self.log = PlanLog()
         self.next_due = 0
         self._plans = 0
+        self._finishing = False
 
     @property
     def held(self) -> int:
@@ -93,17 +95,27 @@ class CertifiedAvoidance:
         """Discard the horizon that is flown, because set-points do not steer the vehicle."""
         self.horizon = None
 
+    def finish(self) -> None:
+        """Make no further plan: the committed one is flown to its end, and then its last position held."""
+        self._finishing = True
+
+    def rests(self, now: int) -> bool:
+        """Return whether nothing is flown, or the committed plan is at rest at ``now`` (µs)."""
+        return self.horizon is None or now >= rest_time(self.horizon)
+
     def fly(self, now: int, situation: AvoidanceInputs) -> Array | None:
         """Bring the committed plan up to date.
 
         Returns its positions (N + 1, 3), m, of the next steps when the yaw is due, otherwise None.
         """
         flight = self._flight
-        if not self._pilot.guided:
+        if self._finishing:
+            flight.commitment.turn(now)
+        elif not self._pilot.guided:
             flight.stand(now, situation.measured.position)
         elif not situation.stale:
             flight.watch(now, situation.measured)
-        if self._pilot.guided and flight.due(now):
+        if self._pilot.guided and not self._finishing and flight.due(now):
             self._replan(now, situation)
         self.horizon = horizon = flight.horizon()
         if horizon is None or now < self.next_due:

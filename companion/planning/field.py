@@ -112,6 +112,13 @@ class FieldAvoidance:
         self.guard.rest()
         self.tracking.reset()
 
+    def finish(self) -> None:
+        """Do nothing: nobody relies on the end of a plan of the field."""
+
+    def rests(self, now: int) -> bool:
+        """Return True: no plan has to be flown to its end."""
+        return True
+
     def fly(self, now: int, situation: AvoidanceInputs) -> Array | None:
         """Make a plan if one is due; return its positions (N + 1, 3), m, from n = 1 on, otherwise None."""
         period = self._config.rates.replan_us

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 from typing import Final
 
 from mavlink_bridge.wire.framing import Framer
@@ -52,6 +53,13 @@ class Stream:
     def waits(self) -> bool:
         """Whether data waits to be written as soon as there is room."""
         return bool(self._waiting)
+
+    @property
+    def hung_up(self) -> bool:
+        """Whether the other side is gone: the connection was closed, or the port unplugged."""
+        poll = select.poll()
+        poll.register(self._fileno, 0)
+        return any(event & (select.POLLHUP | select.POLLERR) for _, event in poll.poll(0))
 
     def fileno(self) -> int:
         """Return the file descriptor, open until ``close``."""

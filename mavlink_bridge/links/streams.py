@@ -99,7 +99,34 @@ class StreamLink:
             self._release()
             self._selector.close()
 
+    def take_over(self) -> None:
+        """Use the streams in a forked process, beside the process that it was forked from.
+
+        The selector is replaced: a forked process shares it, and would change that of the other.
+        """
+        with self._lock:
+            if not self._open:
+                return
+            self._selector.close()
+            self._selector = selectors.DefaultSelector()
+            self._fileno = _number(self._selector)
+            for stream in self._streams:
+                self._selector.register(stream, selectors.EVENT_READ)
+            self._register()
+
+    def release_broken(self) -> None:
+        """Close streams whose other side is gone; for a process that keeps them open and does not read."""
+        with self._lock:
+            for stream in tuple(self._streams):
+                if stream.hung_up:
+                    self._selector.unregister(stream)
+                    self._streams.remove(stream)
+                    stream.close()
+
     # For subclasses.
+
+    def _register(self) -> None:
+        """Register in a new selector what is not a stream."""
 
     def _forget(self) -> None:
         """Close this process's descriptors of all streams, and discard the data that waits for them.

@@ -98,6 +98,10 @@ class TcpCaller(StreamLink):
             self._attempt.close()
             self._attempt = None
 
+    def _register(self) -> None:
+        if self._attempt is not None:
+            self._selector.register(self._attempt, selectors.EVENT_WRITE)
+
     def _release(self) -> None:
         self._abort_attempt()
 
@@ -138,6 +142,9 @@ class TcpListener(StreamLink):
             with connection:
                 _configure(connection)
                 self._adopt(connection.detach())
+
+    def _register(self) -> None:
+        self._selector.register(self._listener, selectors.EVENT_READ)
 
     def _release(self) -> None:
         self._listener.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Sequence
+from random import Random
 from typing import Final
 
 from trials.plan import HOST
@@ -13,10 +14,14 @@ _BUFFER: Final = 1 << 20
 
 
 class CompanionPorts:
-    """UDP port for each of ``systems``; the last sender at a port is that vehicle's companion."""
+    """UDP port for each of ``systems``; the last sender at a port is that vehicle's companion.
 
-    def __init__(self, systems: Sequence[int]) -> None:
+    ``loss``: share of the messages to each receiver that is lost, drawn from ``random``.
+    """
+
+    def __init__(self, systems: Sequence[int], loss: float = 0.0, random: Random | None = None) -> None:
         self.cut = False
+        self._loss, self._random = loss, Random(0) if random is None else random
         self._ports = {system: _bound() for system in systems}
         self._there: dict[int, tuple[str, int]] = {}
 
@@ -49,7 +54,7 @@ class CompanionPorts:
 
     def _pass_on(self, data: bytes, sender: int) -> None:
         for system, place in self._there.items():
-            if system != sender:
+            if system != sender and self._random.random() >= self._loss:
                 try:
                     self._ports[system].sendto(data, place)
                 except OSError:

@@ -27,7 +27,7 @@ class Emulation:
 
     def __init__(self, plan: Plan, receiver: str, directory: Path) -> None:
         count = len(plan.systems)
-        base = _free_base(plan.flavour, count)
+        base = free_base(plan.flavour, count)
         command = [sys.executable, "-m", "outrider", "sitl", "--json", f"--count={count}"]
         command += [f"--flavour={plan.flavour}", f"--speedup={plan.speed}", f"--port-base={base}"]
         if plan.story == SORTIE:
@@ -68,7 +68,7 @@ class Emulation:
             self.summary = json.loads(out)
 
 
-def _free_base(flavour: str, count: int) -> int:
+def free_base(flavour: str, count: int) -> int:
     """Return a base port from which all ports of the SITL are free."""
     kind = socket.SOCK_STREAM if flavour == "ardupilot" else socket.SOCK_DGRAM
     ports = [offset + _STEPS[flavour] * k for offset in _OFFSETS[flavour] for k in range(count)]

@@ -90,5 +90,11 @@ def horizon_of(plan: WirePlan) -> Horizon:
     return Horizon(plan.epoch, plan.dt, knots)
 
 
+def rest_time(horizon: Horizon) -> int:
+    """Return the time (µs) of the knot from which the horizon of a plan that ends at rest is at rest."""
+    moves = np.flatnonzero(horizon.knots[:, 3:].any(axis=1))
+    return horizon.epoch + horizon.dt * (int(moves[-1]) + 1 if len(moves) else 0)
+
+
 def _by_axis(plan: WirePlan) -> list[list[int]]:
     return [[a[axis] for a in plan.accelerations] for axis in range(3)]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from heapq import merge
+from operator import itemgetter
 from pathlib import Path
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -12,7 +14,7 @@ from companion.avoidance.certified.margins import between
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Tunnel
-from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.tlog.log import Record, read_tlog
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.codec import Codec
@@ -29,13 +31,25 @@ from outrider.certify.evidence import (
     Terms,
     UnreadablePayloads,
 )
+from outrider.certify.fly_runs import fly_runs, is_of_backup, logs_of, terms_of_runs
 from outrider.errors import Fault, InputError
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION, resolved
 from outrider.scenarios.companion_settings import settings_of
 from outrider.scenarios.scenario import Scenario
 
-_ALLOWED = "allowed: what outrider swarm SCENARIO --avoidance certified --out leaves"
+_ALLOWED = (
+    "allowed: what outrider swarm SCENARIO --avoidance certified --out leaves, "
+    "or a directory with runs of outrider fly with companion.avoidance certified"
+)
+_LAG_US = 500_000
+"""Time by which the records of a backup node are moved behind those of its companion.
+
+It logs copies of what the companion receives and sends. Only those count that a companion's own log lacks,
+because it was killed.
+"""
+_REPEATED_US = 1_000_000
+"""Largest difference of the times at which two processes of one companion log the same frame."""
 _RECORDS_PER_REPORT = 4096
 """Number of records between two progress reports."""
 
@@ -43,36 +57,45 @@ Watch = Callable[[str, float], None]
 
 
 def read(directory: Path, watch: Watch) -> Evidence:
-    """Read all evidence in ``directory``.
+    """Read all evidence in ``directory``: of a scenario, or of runs of ``outrider fly`` in it or below.
 
     ``watch`` receives the name of the log and the share (0…1) of all logs' bytes that was read. Raises
     InputError for a directory without evidence.
     """
+    runs = fly_runs(directory) if directory.is_dir() else []
+    if runs:
+        return _evidence(directory, terms_of_runs(runs), logs_of(runs), watch)
     path = directory / CONFIGURATION
     scenario = resolved(directory, _ALLOWED).scenario
     if scenario.companion.avoidance != "certified":
         flown = scenario.companion.avoidance
         raise InputError(Fault(str(path), f"flown with scenario.companion.avoidance {flown!r}; {_ALLOWED}"))
-    found = {system: directory / names.log(system) for system in scenario.systems}
-    found = {system: log for system, log in found.items() if log.is_file()}
-    if not found:
-        raise InputError(Fault(str(directory), f"holds no log vehicle-N.tlog; {_ALLOWED}"))
-    size = sum(log.stat().st_size for log in found.values())
-    logs, faults, done = [], [], 0
-    for system, log in found.items():
+    found = {system: [directory / names.log(system)] for system in scenario.systems}
+    present = {system: logs for system, logs in found.items() if logs[0].is_file()}
+    return _evidence(directory, terms_of(scenario), present, watch)
 
-        def sent(at: int, name: str = log.name, before: int = done) -> None:
+
+def _evidence(directory: Path, terms: Terms, found: dict[int, list[Path]], watch: Watch) -> Evidence:
+    """Read the logs ``found`` of each vehicle, by system id."""
+    size = sum(log.stat().st_size for logs in found.values() for log in logs)
+    if not size:
+        raise InputError(Fault(str(directory), f"holds no log vehicle-N.tlog; {_ALLOWED}"))
+    logs, faults, done = [], [], 0
+    for system, paths in found.items():
+
+        def sent(at: int, name: str = names.log(system), before: int = done) -> None:
             watch(name, (before + at) / size)
 
         try:
-            logs.append(_read(system, log, sent))
+            logs.append(_read(system, paths, sent))
         except LogError as error:
             faults.append(str(error))
-        done += log.stat().st_size
+        done += sum(path.stat().st_size for path in paths)
     if not any(log.sightings for log in logs):
-        wrong = faults[0] if faults and not logs else f"{directory}: its {len(found)} logs hold no plan"
+        count = sum(map(len, found.values()))
+        wrong = faults[0] if faults and not logs else f"{directory}: its {count} logs hold no plan"
         raise InputError(f"{wrong}; {_ALLOWED}")
-    return Evidence(terms_of(scenario), tuple(logs))
+    return Evidence(terms, tuple(logs))
 
 
 def terms_of(scenario: Scenario) -> Terms:
@@ -94,7 +117,7 @@ def terms_of(scenario: Scenario) -> Terms:
 
 
 class _Tally:
-    """Contents of one log so far; copies of a plan are counted, and the plan is decoded once."""
+    """Contents of the logs of one vehicle so far; copies of a plan are counted, and it is decoded once."""
 
     def __init__(self, owner: int) -> None:
         self._owner = owner
@@ -160,17 +183,49 @@ class _Tally:
         return Log(self._owner, tuple(sightings), tuple(self._statements), garbled, words, damaged)
 
 
-def _read(owner: int, path: Path, at: Callable[[int], None]) -> Log:
-    """Read one log; ``at`` receives the number of bytes read. Raises LogError."""
-    tally = _Tally(owner)
+def _read(owner: int, paths: Sequence[Path], at: Callable[[int], None]) -> Log:
+    """Read the logs of one vehicle, in the order of time; ``at`` receives the number of bytes read.
+
+    Raises LogError.
+    """
+    tally, repeated = _Tally(owner), _Repeated()
     codec = Codec(lambda identifier, _system, _component: identifier == mavlink.MAVLINK_MSG_ID_TUNNEL)
-    reader, size = read_tlog(path), 0
-    for number, record in enumerate(reader):
+    readers, size = [read_tlog(path) for path in paths], 0
+    lags = [_LAG_US if is_of_backup(path) else 0 for path in paths]
+    shifted = [_timed(reader, lag) for reader, lag in zip(readers, lags, strict=True)]
+    for number, (_, record) in enumerate(merge(*shifted, key=itemgetter(0))):
         size += 8 + len(record.frame)
         if number % _RECORDS_PER_REPORT == 0:
             at(size)
         for message in codec.feed(record.frame):
-            if isinstance(message, Tunnel):
-                tally.add(number, record.time, message)
-    report = reader.report
-    return tally.log(report.bad + report.truncated + codec.counters.bad)
+            if not isinstance(message, Tunnel):
+                continue
+            if len(paths) > 1 and repeated(record.time, record.frame):
+                continue
+            tally.add(number, record.time, message)
+    reports = [reader.report for reader in readers]
+    return tally.log(sum(report.bad + report.truncated for report in reports) + codec.counters.bad)
+
+
+def _timed(records: Iterable[Record], lag: int) -> Iterator[tuple[int, Record]]:
+    """Yield ``records``, each with its time plus ``lag`` (µs)."""
+    for record in records:
+        yield record.time + lag, record
+
+
+class _Repeated:
+    """Detector of frames that two logs of one vehicle contain: a companion's and its backup node's."""
+
+    def __init__(self) -> None:
+        self._seen: dict[bytes, int] = {}
+
+    def __call__(self, time: int, frame: bytes) -> bool:
+        """Return whether the same frame was given shortly before ``time`` (µs)."""
+        before = self._seen.pop(frame, None)
+        # Frames with the same number recur after 256 others, with another epoch in them.
+        while self._seen and time - self._seen[oldest := next(iter(self._seen))] > _REPEATED_US:
+            del self._seen[oldest]
+        if before is not None and time - before <= _REPEATED_US:
+            return True
+        self._seen[frame] = time
+        return False

@@ -1,13 +1,11 @@
-"""Parent's handle of the child process that runs the companion."""
+"""Parent's handle of a child process, which runs the companion or its backup node."""
 
 from __future__ import annotations
 
 import gc
 import multiprocessing
 from multiprocessing.process import BaseProcess
-from typing import Final
-
-from outrider.fly.worker import Worker
+from typing import Final, Protocol
 
 EXIT_TIMEOUT_S: Final = 10.0
 """Time limit for the child to write its files and end (s)."""
@@ -18,10 +16,18 @@ A process that still exists then is probably blocked in the kernel by a disk; it
 """
 
 
+class Body(Protocol):
+    """What a child process does from fork to exit."""
+
+    def main(self) -> None:
+        """Run the process."""
+        ...
+
+
 class ChildProcess:
     """Child process that runs ``worker.main``, started by fork."""
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: Body) -> None:
         fork = multiprocessing.get_context("fork")
         self._process: BaseProcess = fork.Process(target=worker.main, name="companion")
         self._killed = False

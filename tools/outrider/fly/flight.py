@@ -25,10 +25,12 @@ from companion.flight.landing import Landing
 from companion.flight.readiness import OPERATORS_GO
 from companion.values.components import COMPONENT
 from companion.values.phase import Phase
-from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.wire.signing import Signing
+from outrider.fly.backup import Backup
+from outrider.fly.backup_worker import KEPT
 from outrider.fly.child_process import ChildProcess
+from outrider.fly.clocks import CompanionClock
 from outrider.fly.event_log import EventLog
 from outrider.fly.hold_on_exit import farewell
 from outrider.fly.identify import Identification
@@ -38,7 +40,7 @@ from outrider.fly.orders import QUIT, Orders, answered, understood
 from outrider.fly.process_channel import Channel, OrderLink, intercom
 from outrider.fly.request import Request
 from outrider.fly.status import State
-from outrider.fly.watchdog import Watchdog
+from outrider.fly.watchdog import HUNG, Watchdog
 from outrider.fly.wiring import Wiring
 from outrider.fly.worker import Worker
 from outrider.interruption import ReceivedSignal, insisted
@@ -50,6 +52,13 @@ WITHIN: Final = 60.0
 """``MOST`` processes lost within ``WITHIN`` seconds end the flight."""
 _STOP_TIMEOUT_S: Final = 2.0
 """Time limit for the child to stop flying after the stop request (s)."""
+_FINISH_TIMEOUT_S: Final = 8.0
+"""The same with committed plans, which are flown to their end (s)."""
+HUNG_CERTIFIED_S: Final = 6.0
+"""Time without a message after which a companion with a committed plan counts as hung (s).
+
+Its backup node flies the plan to the end meanwhile, so there is time for it to return.
+"""
 _STOP_POLL_S: Final = 0.01
 
 
@@ -82,7 +91,8 @@ class Flight:
         self.last_word = ""
         self._wiring, self._directory = wiring, directory
         self._typed, self._stops, self._look = typed, stops, look
-        self._wall = WallClock()
+        self._clock = CompanionClock(asked.config.clock_error)
+        self._wall = self._clock.clock
         self._signing = None if asked.key is None else Signing(asked.key)
         self._orders = Orders(asked.system, asked.config.takeoff_height, self._signing)
         self._began = time.monotonic()
@@ -92,6 +102,10 @@ class Flight:
         self._left = self._go_given = self._failed = self._elsewhere = False
         self._trouble = ""
         self._simulated: bool | None = None
+        self._certified = asked.config.certified
+        self._backup: Backup | None = None
+        self.carried = 0
+        """Number of set-points that backup nodes have sent in the companion's place."""
 
     def run(self) -> None:
         """Run the flight from the first heartbeat to the end.
@@ -104,13 +118,21 @@ class Flight:
         if not self._identify():
             desk.close()
             orders.release()
+            if self._backup is not None:
+                self._backup.close()
             return
         while True:
             self._wiring.drain()
             try:
+                if self._backup is not None:
+                    # Before the companion: the backup node has to know the first plan that is flown.
+                    self._backup.start()
                 self.event_log.note("process", f"the companion flies in process {child.start()}")
-                self._wiring.lend()
-                self._left, self._watchdog = False, Watchdog(time.monotonic())
+                self._wiring.lend(() if self._backup is None else KEPT)
+                if self._backup is not None:
+                    self._backup.release()
+                hung = HUNG_CERTIFIED_S if self._certified else HUNG
+                self._left, self._watchdog = False, Watchdog(time.monotonic(), hung)
                 self._look_after(desk, child)
             finally:
                 self._finish(desk, child)
@@ -120,6 +142,9 @@ class Flight:
             if self._over():
                 self.fault = self.fault or self._failed or self._elsewhere
                 return
+            if self._certified:
+                # So the next process plans no epoch of which this one may have announced a plan.
+                time.sleep(2e-6 * self.asked.config.companion.certified.epoch_us)
             place = self._directory / f"restart-{len(self.restarts)}"
             if self._signing is not None:
                 self._signing.resume(self.state.stamp)
@@ -133,8 +158,15 @@ class Flight:
     def _child(self, place: Path) -> tuple[ChildProcess, Channel, OrderLink]:
         """Return a process ready to fork, and both ends of its channel; its log goes to ``place``."""
         desk, orders = intercom()
-        wiring = self._wiring
-        worker = Worker(self.asked, wiring.ends, wiring.duplicates, orders, place, self._simulated)
+        wiring, copies = self._wiring, None
+        if self._certified:
+            self._backup = Backup(
+                self.asked, wiring, self._wall, lambda: self.state.stamp, self.event_log.note, place
+            )
+            copies = self._backup.copies
+        worker = Worker(
+            self.asked, wiring.ends, wiring.duplicates, orders, place, self._simulated, self._clock, copies
+        )
         if self._signing is not None:
             worker.resume(self._signing.newest)
         return ChildProcess(worker), desk, orders
@@ -169,6 +201,9 @@ class Flight:
             self._obey(desk)
             self._look()
             self._receive(desk)
+            if self._backup is not None:
+                self._wiring.release_unplugged()
+                self._backup.look()
             if self._left or child.status is not None:
                 ended = "gave up" if child.status is None else f"ended with status {child.status}"
                 self._lose(f"its process {ended}")
@@ -271,6 +306,10 @@ class Flight:
                 self._say_last_word()
             finally:
                 child.join()
+                if self._backup is not None:
+                    self._backup.close()
+                    self.carried += self._backup.carried
+                    self._backup = None
         self._receive(desk)
         desk.close()
 
@@ -279,7 +318,8 @@ class Flight:
         if child.killed:
             child.join()
             return
-        until = time.monotonic() + _STOP_TIMEOUT_S
+        # In certified flight the companion first flies its plan to the end.
+        until = time.monotonic() + (_FINISH_TIMEOUT_S if self._certified else _STOP_TIMEOUT_S)
         while not (self._left or child.status is not None):
             if self._at_once() or time.monotonic() > until:
                 child.kill()
@@ -288,6 +328,9 @@ class Flight:
                 return
             wait([desk.fileno(), child.sentinel], _STOP_POLL_S)
             self._receive(desk)
+            if self._certified:
+                desk.beat(time.monotonic())
+                self._look()
 
     def _at_once(self) -> bool:
         return insisted(self._stops)
@@ -297,12 +340,19 @@ class Flight:
         state = self.state
         if self.asked.dry_run or state.beat is None:
             return
+        if self._backup is not None and (end := self._backup.relieve(self._look)) is not None:
+            self.last_word, self._failed = end.said, end.failed
+            self._report_last_word()
+            return
         beat = Heartbeat(Source(self.asked.system, mavlink.MAV_COMP_ID_AUTOPILOT1), *state.beat)
         if self._signing is not None:
             self._signing.resume(state.stamp)
         word = HoldOnExit(self.asked.system, beat, self._signing, steered=state.ours)
         farewell(word, self._wiring.ends["autopilot"], self._wall, self._at_once)
         self.last_word, self._failed = word.said, word.failed
-        self.event_log.note("last word", f"the vehicle: {word.said or 'asked to hold, no answer yet'}")
-        if word.failed:
+        self._report_last_word()
+
+    def _report_last_word(self) -> None:
+        self.event_log.note("last word", f"the vehicle: {self.last_word or 'asked to hold, no answer yet'}")
+        if self._failed:
             self.event_log.note("critical", "the vehicle is armed and nothing controls it: take it over")

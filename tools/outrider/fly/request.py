@@ -9,7 +9,7 @@ from pathlib import Path
 from companion.config.target_source import GlobalPositionSource
 from mavlink_bridge.errors import EndpointError
 from mavlink_bridge.key import Key
-from mavlink_bridge.links.endpoints import Endpoint, Replay, parse_endpoint
+from mavlink_bridge.links.endpoints import Endpoint, Multicast, Replay, parse_endpoint
 from outrider.address_scope import exposed
 from outrider.errors import InputError
 from outrider.fly.link_budget import doubts, doubts_of_autopilot
@@ -74,6 +74,11 @@ def checked(options: Options) -> Request:
             raise InputError(f"--system {options.system}: is the target's; allowed: another's")
         config = config.model_copy(update={"system": options.system})
     config = with_fleet_file(config, place)
+    if options.dry_run and config.certified:
+        raise InputError(
+            f"--config {options.config}: companion.avoidance 'certified' plans only in agreement with other "
+            "companions, to which a dry run sends nothing; allowed with --dry-run: 'field'"
+        )
     if options.dry_run and options.go:
         raise InputError("--go: does not go with --dry-run, in which nothing takes off")
     autopilot = _endpoint("autopilot", options.autopilot)
@@ -93,6 +98,8 @@ def checked(options: Options) -> Request:
             "mcast:,127.0.0.1 or /dev/ttyUSB0,57600"
         )
     swarm = _endpoint("swarm", options.swarm)
+    if config.certified:
+        _check_certified(config, swarm)
     endpoints = {
         "autopilot": autopilot,
         "swarm": swarm,
@@ -131,6 +138,24 @@ def checked(options: Options) -> Request:
         options.go,
         options.as_json,
     )
+
+
+def _check_certified(config: FlyConfig, swarm: Endpoint) -> None:
+    """Check a request for committed plans with the swarm link ``swarm``. Raises InputError."""
+    certified = config.companion.certified
+    if config.system not in certified.fleet:
+        raise InputError(
+            f"--system {config.system}: is not in companion.certified.fleet; "
+            f"allowed: {', '.join(map(str, certified.fleet))}"
+        )
+    if certified.fleet_time == "own" and not (isinstance(swarm, Multicast) and not exposed(swarm)):
+        raise InputError(
+            f"--swarm {swarm}: companions of other computers, whose clocks differ, may be heard there; "
+            "allowed with companion.certified.fleet_time own: mcast:,127.0.0.1, if all run on this "
+            "computer; otherwise write fleet_time: measured"
+        )
+    if config.clock_error is not None:
+        sys.stderr.write("outrider fly: clock_error: the companion's clock is made wrong, for a test\n")
 
 
 def _of_log(options: Options, config: FlyConfig, log: Path) -> Request:

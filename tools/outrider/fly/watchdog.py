@@ -14,16 +14,17 @@ _MAX_POLL_INTERVAL_S: Final = 0.5
 class Watchdog:
     """Watchdog of a process that was started at ``now`` (s).
 
-    A late poll restarts the time-out: what delayed the caller may have delayed the other process as well.
+    ``hung``: as ``HUNG``. A late poll restarts the time-out: what delayed the caller may have delayed the
+    other process as well.
     """
 
-    def __init__(self, now: float) -> None:
+    def __init__(self, now: float, hung: float = HUNG) -> None:
         self._since = self._looked = now
-        self._limit = FIRST
+        self._limit, self._hung = FIRST, hung
 
     def received(self, now: float) -> None:
         """Restart the time-out: a message arrived."""
-        self._since, self._limit = now, HUNG
+        self._since, self._limit = now, self._hung
 
     def stopped(self, now: float) -> bool:
         """Return whether the process has been silent for too long; to be polled at least every 0.5 s."""

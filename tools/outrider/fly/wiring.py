@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from contextlib import ExitStack
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ from mavlink_bridge.links.endpoints import Endpoint
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.links.serial_port import SerialPort
+from mavlink_bridge.links.streams import StreamLink
 from mavlink_bridge.wire.header import Header
 from outrider.errors import InputError
 from outrider.supervision.duplicate_ids import DuplicateIds
@@ -57,11 +59,26 @@ class Wiring(NamedTuple):
         for demultiplexer in self.demultiplexers:
             demultiplexer.forget()
 
-    def lend(self) -> None:
-        """Release serial ports in this process, after a forked process has taken over the links."""
+    def lend(self, keep: Collection[str] = ()) -> None:
+        """Release serial ports in this process, after a forked process has taken over the links.
+
+        Those that carry one of the links ``keep`` stay open here.
+        """
+        for demultiplexer in self.demultiplexers:
+            if isinstance(demultiplexer.link, SerialPort) and demultiplexer.ends.keys().isdisjoint(keep):
+                demultiplexer.link.let_go()
+
+    def release_unplugged(self) -> None:
+        """Release unplugged serial ports, so that the process that reads them can open them again."""
         for demultiplexer in self.demultiplexers:
             if isinstance(demultiplexer.link, SerialPort):
-                demultiplexer.link.let_go()
+                demultiplexer.link.release_broken()
+
+    def take_over(self) -> None:
+        """Use the links in a forked process, beside the one that it was forked from."""
+        for demultiplexer in self.demultiplexers:
+            if isinstance(demultiplexer.link, StreamLink):
+                demultiplexer.link.take_over()
 
     def close(self) -> None:
         """Close all links."""

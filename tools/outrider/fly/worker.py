@@ -13,14 +13,18 @@ from typing import Final
 
 from companion.dry_run import DryRun
 from companion.node import Companion
-from mavlink_bridge.clocks.clock import Clock, WallClock
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.loops.garbage import IdleCollector
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.priority import ask_for_priority, sharpen_timers
 from mavlink_bridge.loops.realtime import RealTime
+from mavlink_bridge.node import Node
 from mavlink_bridge.wire.signing import Signing
+from outrider.fly.backup_copies import CopySender
+from outrider.fly.clocks import CompanionClock
+from outrider.fly.copied_node import CopiedNode
 from outrider.fly.log import Log
 from outrider.fly.process_channel import OrderLink
 from outrider.fly.read_only_link import ReadOnlyLink
@@ -30,7 +34,7 @@ from outrider.fly.transmit_statistics import TransmitStatistics
 from outrider.supervision.duplicate_ids import DuplicateIds
 from outrider.supervision.supervised_node import SupervisedNode
 
-_IGNORED: Final = (
+IGNORED: Final = (
     signal.SIGINT,
     signal.SIGTERM,
     signal.SIGHUP,
@@ -39,7 +43,7 @@ _IGNORED: Final = (
     signal.SIGTTIN,
     signal.SIGTTOU,
 )
-"""Signals that the child ignores.
+"""Signals that a child ignores.
 
 Only the parent handles them, so a closed or stopped terminal does not end the child.
 """
@@ -50,7 +54,8 @@ class Worker:
 
     ``links`` maps the companion's link names to links, which ``duplicates`` observes; the log is written to
     ``directory``. ``simulated``: whether an earlier process identified the autopilot's clock as a
-    simulation's; None if unknown.
+    simulation's; None if unknown. ``clock``: a new one by default. ``copies``: the end of the socket to the
+    backup node; None without one.
     """
 
     def __init__(
@@ -61,21 +66,20 @@ class Worker:
         orders: OrderLink,
         directory: Path,
         simulated: bool | None = None,
+        clock: CompanionClock | None = None,
+        copies: CopySender | None = None,
     ) -> None:
+        self._clock = CompanionClock(asked.config.clock_error) if clock is None else clock
+        self._copies = copies
         self._asked, self._orders, self._directory = asked, orders, directory
         self._read_only_links = [ReadOnlyLink(link) for link in links.values()] if asked.dry_run else []
         self._links = dict(zip(links, self._read_only_links or links.values(), strict=True))
         self._parent, self._duplicates, self._simulated = os.getpid(), duplicates, simulated
         self._signing = None if asked.key is None else Signing(asked.key)
-        kind = DryRun if asked.dry_run else Companion
-        config = asked.config
-        self.companion = kind(
-            config.settings,
-            config.system,
-            config.target,
-            config.origin.frame,
-            time.thread_time_ns,
-            self._signing,
+        config, stopwatch, signing = asked.config, time.thread_time_ns, self._signing
+        given = config.settings, config.system, config.target, config.origin.frame, stopwatch, signing
+        self.companion: Companion = (
+            DryRun(*given) if asked.dry_run else Companion(*given, self._clock.system_clock)
         )
 
     def resume(self, newest: int) -> None:
@@ -95,7 +99,7 @@ class Worker:
 
     def main(self) -> None:
         """Run the process from fork to exit; exit status 0, or 3 after an exception."""
-        for which in _IGNORED:
+        for which in IGNORED:
             signal.signal(which, signal.SIG_IGN)
         if self._asked.realtime:
             self._orders.tell(kind="event", at=0.0, what="priority", text=ask_for_priority().told)
@@ -122,7 +126,7 @@ class Worker:
 
     def _fly(self, log: Log) -> None:
         asked, node = self._asked, self.companion
-        wall = WallClock()
+        wall = self._clock.clock
         followed = self.followed(wall)
         supervised = SupervisedNode(node, wall, followed, self._signing, self._duplicates)
         departures = TransmitStatistics(node.config.limits, node.config.tracking.largest)
@@ -132,14 +136,21 @@ class Worker:
             "ground": (self._links["ground"], self._orders),
         }
 
+        certified = asked.config.certified
+
         def stepped(now: int) -> bool:
-            if os.getppid() != self._parent or self._orders.alone:
+            alone = os.getppid() != self._parent or self._orders.alone
+            if certified and (alone or self._orders.stop):
+                supervised.finish()
+            if alone and (not certified or supervised.rested):
                 supervised.give_up()
             if isinstance(node, DryRun):
                 for message in node.would:
                     departures.take(now, message)
                 node.would.clear()
             news.look(now, wall.now())
+            if certified and self._orders.stop and supervised.rested:
+                return True
             return supervised.last is not None and supervised.last.over
 
         with IdleCollector() as garbage:
@@ -147,15 +158,18 @@ class Worker:
             def idle(free: int) -> None:
                 garbage.idle(free if followed is None else int(free / followed.rate))
 
+            flying: Node = supervised
+            if self._copies is not None:
+                flying = CopiedNode(supervised, node, self._copies, self._signing)
             loop = RealTime(
-                Scheduled(supervised, asked.config.period_us),
+                Scheduled(flying, asked.config.period_us),
                 links,
                 wall if followed is None else followed,
                 taps=(log, departures),
                 on_idle=idle,
             )
             try:
-                loop.run(lambda: self._orders.stop, stepped)
+                loop.run(lambda: self._orders.stop and not certified, stepped)
             finally:
                 self._leave(loop, news, departures, 1.0 if followed is None else followed.rate)
 

@@ -28,6 +28,10 @@ def moving(system: int) -> str:
     return f"moving-{system}"
 
 
+BACKUP_LOGS = "backup-{}"
+"""Folder with the log of the n-th backup process of a companion."""
+
+
 def log(system: int) -> str:
     """Return the file name of the vehicle's tlog."""
     return f"vehicle-{system}.tlog"

@@ -42,6 +42,13 @@ A receiver that misses one plan continues with the previous plan, which is 1.6 s
 """
 
 
+class ClockError(Settings):
+    """Error that is added to the companion's clock: an aid for tests of fleet time, in simulations only."""
+
+    offset_ms: float = Field(0.0, ge=-600_000.0, le=600_000.0, description="ms that it is ahead at the start")
+    drift_ppm: float = Field(0.0, ge=-1000.0, le=1000.0, description="rate at which it runs fast, ppm")
+
+
 class FlyConfig(Settings):
     """Configuration of one companion; ``system`` is the id of its vehicle."""
 
@@ -72,7 +79,15 @@ class FlyConfig(Settings):
         multiple_of=4,
         description="between the companion's steps, µs of that clock",
     )
+    clock_error: ClockError | None = Field(
+        None, description="for tests in simulations only: an error of the companion's clock; null: none"
+    )
     companion: CompanionConfig = CompanionConfig()
+
+    @property
+    def certified(self) -> bool:
+        """Whether the vehicle flies committed plans."""
+        return self.companion.avoidance == "certified"
 
     @property
     def settings(self) -> CompanionConfig:
@@ -89,9 +104,26 @@ class FlyConfig(Settings):
         if self.target == self.system:
             raise ValueError(f"target: {self.target} is the own system id; allowed: another's")
         if self.companion.avoidance == "certified":
-            # Committed plans need one time for all vehicles, within milliseconds, and a backup node.
-            raise ValueError("companion.avoidance 'certified' is not for real vehicles yet; allowed: 'field'")
+            self._certifiable()
         if self.period_us > self.companion.rates.setpoint_us:
             longest = self.companion.rates.setpoint_us
             raise ValueError(f"period_us must not exceed companion.rates.setpoint_us = {longest}")
         return self
+
+    def _certifiable(self) -> None:
+        """Raise ValueError if committed plans cannot be flown with these settings."""
+        if self.clock != "wall":
+            raise ValueError(
+                f"clock {self.clock!r} follows the autopilot's, and committed plans need a clock that runs "
+                "evenly; allowed with companion.avoidance 'certified': 'wall'"
+            )
+        if self.radio is not None:
+            raise ValueError(
+                f"radio {self.radio}: committed plans do not fit it; "
+                "allowed with companion.avoidance 'certified': null"
+            )
+        if not self.companion.certified.fleet:
+            raise ValueError(
+                "companion.certified.fleet is empty: a vehicle that is not heard would not be waited for; "
+                "needed: the system ids of all vehicles that fly committed plans"
+            )

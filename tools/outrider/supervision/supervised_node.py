@@ -30,6 +30,11 @@ OURS = (Phase.PREPARE, *STEERED, Phase.LAND)
 
 In all other phases, as when another controller has taken over the vehicle, no hold is requested on exit.
 """
+SETTLING_US = 1_000_000
+"""Time for which a committed plan has been at rest before the hold is requested (µs).
+
+The vehicle follows its plan late.
+"""
 _OTHERS = ("swarm", "target")
 
 
@@ -56,6 +61,7 @@ class SupervisedNode:
         self._gate = TakeoffInhibit(companion.system, signing)
         self._warned = False
         self._stamp = 0
+        self._rests_for = self._stepped = 0
         self.settled = followed is None or followed.known
         """Whether the rate of the own clock is known."""
 
@@ -70,6 +76,15 @@ class SupervisedNode:
         if self._duplicates is not None and self._duplicates.seen:
             return DUPLICATE
         return "" if self.settled else CLOCK
+
+    def finish(self) -> None:
+        """Let the companion fly its committed plan to the end, and make no other one."""
+        self.companion.finish()
+
+    @property
+    def rested(self) -> bool:
+        """Whether the companion flies nothing, or its plan has been at rest for ``SETTLING_US``."""
+        return self.last is not None or self._rests_for >= SETTLING_US
 
     def give_up(self) -> None:
         """Replace the companion by the hold on exit, which sends no set-points.
@@ -101,6 +116,8 @@ class SupervisedNode:
             self._warned = barred == DUPLICATE
             self.companion.reporter.report(Severity.CRITICAL, "Own system id used twice", begins=self._warned)
         leaving = self.companion.step(now, inbox) + answers
+        self._rests_for = self._rests_for + now - self._stepped if self.companion.rests(now) else 0
+        self._stepped = now
         stamp = self.companion.world.stamp
         if self._followed is not None and stamp != self._stamp:
             self._stamp = stamp

@@ -1,0 +1,91 @@
+"""Runs of ``outrider fly`` as evidence: a directory for each companion, with the logs of its processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from companion.avoidance.certified.fingerprint import identity
+from companion.avoidance.certified.margins import between
+from outrider.certify.evidence import Terms
+from outrider.errors import Fault, InputError
+from outrider.runs import names
+from outrider.runs.configuration import CONFIGURATION
+from outrider.scenarios.fly_config import FlyConfig
+from outrider.yaml_files.yaml_file import load
+
+
+class FlyRun(NamedTuple):
+    """One run of ``outrider fly``."""
+
+    directory: Path
+    config: FlyConfig
+
+    @property
+    def logs(self) -> list[Path]:
+        """Its logs: of all companion processes and their backup nodes, the first process first."""
+        found = self.directory.rglob(names.log(self.config.system))
+        return sorted(found, key=lambda log: (len(log.parts), log))
+
+
+def fly_runs(directory: Path) -> list[FlyRun]:
+    """Return the runs of ``outrider fly`` in ``directory`` and below; an empty list if there are none.
+
+    Runs without committed plans are left out.
+    """
+    found = []
+    for path in sorted(directory.rglob(CONFIGURATION)):
+        try:
+            config = load(path, FlyConfig)
+        except InputError:
+            continue
+        if config.certified:
+            found.append(FlyRun(path.parent, config))
+    return found
+
+
+def logs_of(runs: Iterable[FlyRun]) -> dict[int, list[Path]]:
+    """Return the logs of each vehicle, by system id."""
+    found: dict[int, list[Path]] = {}
+    for run in runs:
+        found.setdefault(run.config.system, []).extend(run.logs)
+    return found
+
+
+def is_of_backup(log: Path) -> bool:
+    """Return whether ``log`` is that of a backup node."""
+    return log.parent.name.startswith(names.BACKUP_LOGS.format(""))
+
+
+def terms_of_runs(runs: Sequence[FlyRun]) -> Terms:
+    """Return the terms on which the companions agree. Raises InputError if two of them do not."""
+    terms = [(run, _terms(run.config)) for run in runs]
+    first, agreed = terms[0]
+    for run, other in terms[1:]:
+        for name, value, wanted in zip(Terms._fields, other, agreed, strict=True):
+            if value != wanted:
+                raise InputError(
+                    Fault(
+                        str(run.directory / CONFIGURATION),
+                        f"{name} of committed plans is {value}, and {wanted} in {first.directory}; "
+                        "allowed: the same for all vehicles",
+                    )
+                )
+    return agreed
+
+
+def _terms(config: FlyConfig) -> Terms:
+    companion, certified = config.settings, config.settings.certified
+    x, y, z = (round(1e3 * most) for most in companion.limits.u_max)
+    return Terms(
+        tuple(sorted(certified.fleet)),
+        frozenset(),
+        certified.dt_us,
+        certified.epoch_us,
+        companion.horizon.steps + 1,
+        identity(companion, config.origin.frame),
+        between(certified, companion.field, companion.limits),
+        (x, y, z),
+        companion.planar,
+    )

@@ -1,0 +1,115 @@
+"""Plan of a trial of certified separation: vehicles, clocks, losses, and what happens to which process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from random import Random
+from typing import Any, Final
+
+import yaml
+
+from trials.plan import FLAVOURS, TARGET
+
+MIXED: Final = "mixed"
+KINDS: Final = (*FLAVOURS, MIXED)
+PROCESSES: Final = ("companion", "parent", "backup node")
+"""Processes of ``outrider fly`` that may be killed or stopped."""
+SPACING: Final = 6.0
+"""Distance between two vehicles at the start (m)."""
+STOP_S: Final = 3.0
+"""Time for which a process is stopped (s)."""
+_ORIGIN: Final = {"latitude": 47.397742, "longitude": 8.545594, "altitude": 488.0}
+_HEIGHT: Final = 6.0
+
+
+@dataclass(frozen=True)
+class CertifiedPlan:
+    """Trial of ``count`` vehicles of ``kind`` that swap places; all random choices follow from ``seed``.
+
+    ``victims``: kinds of processes that may be killed or stopped. ``offset_ms``, ``drift_ppm``: bounds of the
+    errors of the companions' clocks.
+    """
+
+    kind: str = FLAVOURS[0]
+    count: int = 5
+    seed: int = 1
+    loss: float = 0.2
+    offset_ms: float = 5000.0
+    drift_ppm: float = 50.0
+    victims: tuple[str, ...] = PROCESSES
+    seconds: float = 45.0
+    """Time from the first goals to the end (s)."""
+    d_min: float = 0.5
+    random: Random = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "random", Random(f"certified {self.kind} {self.seed}"))
+
+    @property
+    def systems(self) -> range:
+        """System ids of the vehicles."""
+        return range(1, self.count + 1)
+
+    @property
+    def origin(self) -> dict[str, float]:
+        """Origin of the fleet frame, below the first vehicle."""
+        return _ORIGIN
+
+    def flavour_of(self, system: int) -> str:
+        """Return the flavour of that vehicle's autopilot."""
+        return FLAVOURS[system % 2] if self.kind == MIXED else self.kind
+
+    def start(self, system: int) -> tuple[float, float, float]:
+        """Return the place at which that vehicle flies first: east, north, up (m)."""
+        return (SPACING * (system - 1), 0.0, _HEIGHT)
+
+    def goal(self, system: int, turn: int) -> tuple[float, float, float]:
+        """Return its goal in ``turn`` 0, 1, …: the mirrored place of the row, and back, further north."""
+        other = self.count + 1 - system if turn % 2 == 0 else system
+        return (SPACING * (other - 1), 3.0 * (turn + 1), _HEIGHT)
+
+    def document(self, system: int, random: Random) -> dict[str, Any]:
+        """Return the companion's file of that vehicle, with a clock drawn from ``random``."""
+        error = {
+            "offset_ms": round(random.uniform(-self.offset_ms, self.offset_ms), 3),
+            "drift_ppm": round(random.uniform(-self.drift_ppm, self.drift_ppm), 3),
+        }
+        width = SPACING * self.count
+        return {
+            "system": system,
+            "target": TARGET,
+            "origin": self.origin,
+            "takeoff_height": _HEIGHT,
+            "clock": "wall",
+            "clock_error": error,
+            "period_us": 20_000,
+            "companion": {
+                "task": "goto",
+                "avoidance": "certified",
+                "limits": {
+                    "u_max": [1.5, 1.5, 1.0],
+                    "v_max": [2.0, 2.0, 1.0],
+                    "box_min": [-width, -width, 2.5],
+                    "box_max": [2 * width, 2 * width, 30.0],
+                },
+                "field": {"d_min": self.d_min, "position_sigma": 0.02},
+                "guard": {"fence_radius": 200.0, "fence_height": 50.0, "tube": 3.0},
+                "certified": {
+                    "fleet": list(self.systems),
+                    "fleet_time": "measured",
+                    "clock_us": 40_000,
+                    "tube": 1.0,
+                    "time_sources": {"reference": 1},
+                },
+                "rates": {"setpoint_us": 40_000},
+            },
+        }
+
+    def write(self, place: Path) -> dict[int, Path]:
+        """Write the companions' files to ``place``; return the paths by system id."""
+        paths = {}
+        for system in self.systems:
+            path = paths[system] = place / f"companion-{system}.yaml"
+            path.write_text(yaml.safe_dump(self.document(system, self.random), sort_keys=False))
+        return paths
