@@ -94,6 +94,14 @@ class Commitment:
             self.current = carried_on(self.current, (epoch - self.current.epoch) // self.current.dt)
         return self.current is not None and self.following is None
 
+    @property
+    def unannounced(self) -> bool:
+        """Whether the current plan was carried on without an announcement, because a step came too late.
+
+        No agreement is made on it: the plan of the next epoch is announced in its place.
+        """
+        return self.current is not None and self.current.epoch > self.announced_until
+
     def last_call(self, now: int) -> bool:
         """Return whether at most ``last_call_us`` of the epoch is left: then the plan is carried on."""
         return now + self._config.last_call_us >= self.epoch(now) + self._config.epoch_us

@@ -121,7 +121,8 @@ class CertifiedFlight:
         self._polled_at, self._in_control = now, True
         self.agreements.rejoin()
         turned = self.commitment.turn(now)
-        self._agree(now)
+        if not (turned and self.commitment.unannounced):
+            self._agree(now)
         if not turned:
             return False
         wrong = not self.clocks.wrong.isdisjoint(self.agreements.members)
