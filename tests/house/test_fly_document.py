@@ -25,6 +25,7 @@ PAGES = [
     DOCS / f"{name}.md" for name in ("fly", "raspberry-pi-px4", "raspberry-pi-ardupilot", "mavlink-router")
 ]
 OF_OTHERS = {"--count", "--first-id", "--port-base", "--to", "--origin", "--sensors", "--response"}
+OF_REPLAY = {"--certify"}
 OF_SYSTEM = {"--home-dir", "--shell", "--now"}
 
 
@@ -35,8 +36,9 @@ def options(command: str) -> set[str]:
 
 def test_every_option_is_documented_and_every_documented_one_exists() -> None:
     assert options("sitl") >= OF_OTHERS
+    assert options("replay") >= OF_REPLAY
     found = set(re.findall(r"(?<![-\w])--[a-z][a-z-]*", TEXT))
-    assert found - OF_OTHERS - OF_SYSTEM == options("fly")
+    assert found - OF_OTHERS - OF_REPLAY - OF_SYSTEM == options("fly")
     assert options("fly") <= set(re.findall(r"^\| `(--[a-z-]+)", TEXT, re.MULTILINE))
 
 
