@@ -89,6 +89,14 @@ class Arrivals:
                 found[system] = Track(np.array([row[0] for row in rows]), places, armed)
         return found
 
+    def moved(self, system: int, since: float) -> float:
+        """Return the largest distance (m) of ``system`` from its place at ``since`` (s), from then on."""
+        track = self.tracks().get(system)
+        if track is None or track.times[-1] <= since:
+            return 0.0
+        places = track.places[track.times >= since]
+        return float(np.linalg.norm(places - places[0], axis=1).max())
+
     def least(self) -> tuple[float, tuple[int, int]]:
         """Return the least distance (m) of two vehicles whose motors run, and which two."""
         tracks = self.tracks()

@@ -42,6 +42,8 @@ PATIENCE: Final = 90.0
 """Wall time after which an expected event is given up (s)."""
 TURN_S: Final = 20.0
 """Time between two goals (s)."""
+GOES_ON_M: Final = 3.0
+"""Distance (m) that each other vehicle has flown at least after a process was killed or stopped."""
 ARRIVED_M: Final = 1.5
 """Distance (m) within which a goal counts as reached."""
 _GROUND: Final = Source(255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
@@ -62,6 +64,8 @@ class CertifiedFlight:
         self._next_goals = 0.0
         self._there: set[int] = set()
         self._pending: list[tuple[float, Callable[[], None]]] = []
+        self.struck = 0.0
+        """Time (s) of the last act."""
         self.hit: set[int] = set()
         """Vehicles whose companion was killed or stopped."""
         with ExitStack() as files:
@@ -122,6 +126,7 @@ class CertifiedFlight:
     def _kill(self, system: int) -> None:
         what = self.plan.random.choice(self.plan.victims)
         os.kill(self._process(system, what), signal.SIGKILL)
+        self.struck = time.monotonic()
         self.hit.add(system)
         self.acts.append(f"{what} of vehicle {system} killed")
 
@@ -129,6 +134,7 @@ class CertifiedFlight:
         what = self.plan.random.choice(self.plan.victims)
         process = self._process(system, what)
         os.kill(process, signal.SIGSTOP)
+        self.struck = time.monotonic()
         self.hit.add(system)
         self.acts.append(f"{what} of vehicle {system} stopped for {STOP_S:g} s")
         self._at(STOP_S, lambda: os.kill(process, signal.SIGCONT))
@@ -216,7 +222,10 @@ def flown(plan: CertifiedPlan, directory: Path) -> dict[str, Any]:
     except OutriderError as error:
         faults.append(str(error))
         certified = {}
-    others = [count for system, count in flight.reached.items() if system not in flight.hit]
+    others = [system for system in plan.systems if system not in flight.hit]
+    moved = {system: round(flight.arrivals.moved(system, flight.struck), 1) for system in others}
+    if any(far < GOES_ON_M for far in moved.values()):
+        faults.append(f"not all others have flown on: {moved}")
     found = {
         "kind": plan.kind,
         "seed": plan.seed,
@@ -224,7 +233,7 @@ def flown(plan: CertifiedPlan, directory: Path) -> dict[str, Any]:
         "least_m": round(least, 3),
         "pair": pair,
         "reached": flight.reached,
-        "others_reached": min(others, default=0),
+        "others_moved_m": moved,
         "certify": certified,
         "faults": faults,
     }

@@ -20,7 +20,7 @@ from mavlink_bridge.links.endpoints import BAUD_RATES, Multicast, Serial, TcpIn,
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.links.serial_port import SerialPort
 from mavlink_bridge.links.stream import Assembler
-from mavlink_bridge.links.streams import HUNG, RETRY
+from mavlink_bridge.links.streams import HUNG, RETRY, StreamLink
 from mavlink_bridge.links.tcp import BACKLOG, MOST_CALLERS, TcpCaller, TcpListener
 from mavlink_bridge.links.udp import (
     MOST_PEERS,
@@ -464,6 +464,48 @@ def test_who_lets_a_serial_port_go_has_no_file_of_it_and_the_fork_goes_on() -> N
         os.close(end)
     here.close()
     there.close()
+
+
+def test_a_fork_that_takes_over_changes_nothing_for_the_other() -> None:
+    """Both have the connection: what the fork reads or registers is not the other's."""
+    here, there = tcp()
+    frames = [frame(number) for number in range(3)]
+    (read, write), (told, tell) = os.pipe(), os.pipe()
+    child = os.fork()
+    if not child:
+        assert isinstance(here, StreamLink)
+        here.take_over()
+        found = gather(here, bool)
+        here.send(frames[1])
+        os.write(tell, b"1" if found == [frames[0]] else b"0")
+        # The other reads only now.
+        os.read(read, 1)
+        here.close()
+        os._exit(0)
+    there.send(frames[0])
+    assert os.read(told, 1) == b"1"
+    assert gather(there, bool) == [frames[1]]
+    os.write(write, b"1")
+    assert os.waitpid(child, 0)[1] == 0
+    # The fork has closed its descriptors: the connection goes on.
+    there.send(frames[2])
+    assert gather(here, bool) == [frames[2]]
+    for end in (read, write, told, tell):
+        os.close(end)
+    here.close()
+    there.close()
+
+
+def test_who_only_keeps_a_serial_port_open_releases_it_when_it_is_unplugged() -> None:
+    near, far = os.openpty()
+    port = SerialPort(Serial(os.ttyname(far), 57600), SimulatedClock())
+    os.close(far)
+    port.release_broken()
+    assert port.peers == 1
+    os.close(near)
+    port.release_broken()
+    assert port.peers == 0
+    port.close()
 
 
 def test_a_line_that_is_behind_takes_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
