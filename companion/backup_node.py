@@ -140,16 +140,21 @@ class BackupNode:
         if self._signing is not None:
             self._signing.present(now)
         messages = [message for link, data in inbox for message in self._codecs[link].feed(data, whole=True)]
-        return self.advance(now, messages)
+        self.receive(now, messages)
+        return self.advance(now)
 
-    def advance(self, now: int, messages: Sequence[Message]) -> list[Datagram]:
-        """Do a step with ``messages`` that were decoded, and whose signatures were checked, elsewhere.
+    def receive(self, now: int, messages: Sequence[Message]) -> None:
+        """Receive ``messages`` that ``accepts`` accepts, decoded and checked elsewhere.
 
-        They are those that ``accepts`` accepts. Signatures continue after the newest stamp of ``signing``.
+        ``now`` (µs): time at which the companion sent its own. Whether a set-point agrees with its plan is
+        judged at that time.
         """
-        self._boot = now if self._boot is None else self._boot
         for message in messages:
             self._receive(now, message)
+
+    def advance(self, now: int) -> list[Datagram]:
+        """Do a step at ``now`` (µs); signatures continue after the newest stamp of ``signing``."""
+        self._boot = now if self._boot is None else self._boot
         beat = self._heartbeat(now)
         profile = self._profile(now)
         if profile is None:

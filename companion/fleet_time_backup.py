@@ -59,20 +59,25 @@ class FleetTimeBackup:
         if self._signing is not None:
             self._signing.present(now)
         messages = [message for link, data in inbox for message in self._codecs[link].feed(data, whole=True)]
-        return self.advance(now, messages)
+        self.receive(now, messages)
+        return self.advance(now)
 
-    def advance(self, now: int, messages: Sequence[Message]) -> list[Datagram]:
-        """Do a step at ``now`` (µs, own clock) with ``messages``, see ``BackupNode.advance``."""
+    def receive(self, now: int, messages: Sequence[Message]) -> None:
+        """Receive ``messages`` that the companion sent at ``now`` (µs, own clock), see ``BackupNode``."""
         for message in messages:
             if isinstance(message, Tunnel) and message.payload_type == PAYLOAD_TYPE:
                 self._receive(message.payload)
             elif isinstance(message, GpsGlobalOrigin):
                 self._origin = message
         if self._ahead is None:
-            return []
+            return
         earlier = [] if self._origin is None or not self._begins else [self._origin]
         self._begins = False
-        return self._node.advance(now + self._ahead, [*earlier, *messages])
+        self._node.receive(now + self._ahead, [*earlier, *messages])
+
+    def advance(self, now: int) -> list[Datagram]:
+        """Do a step at ``now`` (µs, own clock); nothing happens before fleet time is known."""
+        return [] if self._ahead is None else self._node.advance(now + self._ahead)
 
     def _receive(self, payload: bytes) -> None:
         """Take the companion's fleet time; one that it does not know changes nothing."""

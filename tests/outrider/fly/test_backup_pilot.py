@@ -88,7 +88,7 @@ class Rig:
                 vehicle += self._trusted.encode(beat)
             autopilot = self._trusted.encode(self._setpoint()) if since % 20_000 == 0 else b""
             swarm = self._trusted.encode(Tunnel(COMPANION, 0, 0, PLAN, pack(self.plan)))
-            inbox.append(Datagram("copies", Copies(0, 0, vehicle, autopilot, swarm).pack()))
+            inbox.append(Datagram("copies", Copies(self.now, 0, vehicle, autopilot, swarm).pack()))
         elif self.pilot.deaf and self.hears and since % SECOND == 0:
             inbox.append(Datagram("autopilot", self._vehicle.encode(beat)))
         return inbox
@@ -153,7 +153,7 @@ def test_a_plan_that_has_not_begun_is_not_said_to_be_the_last() -> None:
     rig = Rig()
     rig.run(0.5)
     following = plan_from(BEGIN + 700_000)
-    rig.pilot.step(rig.now, [copied(swarm=Tunnel(COMPANION, 0, 0, PLAN, pack(following)))])
+    rig.pilot.step(rig.now, [copied(rig.now, Tunnel(COMPANION, 0, 0, PLAN, pack(following)))])
     rig.copies, rig.pilot.gone = False, True
     rig.run(0.2)
     assert rig.heard(Tunnel) == []
@@ -161,9 +161,9 @@ def test_a_plan_that_has_not_begun_is_not_said_to_be_the_last() -> None:
     assert rig.heard(Tunnel)[0][0] >= following.epoch
 
 
-def copied(swarm: Message) -> Datagram:
+def copied(time: int, swarm: Message) -> Datagram:
     codec = Codec()
-    return Datagram("copies", Copies(swarm=codec.encode(swarm)).pack())
+    return Datagram("copies", Copies(time, swarm=codec.encode(swarm)).pack())
 
 
 def test_a_companion_that_hangs_keeps_the_vehicle_and_is_not_replaced() -> None:
@@ -183,6 +183,20 @@ def test_a_companion_that_hangs_keeps_the_vehicle_and_is_not_replaced() -> None:
     rig.run(1.0)
     assert len(rig.heard(SetpointLocal)) == count
     assert not rig.pilot.over
+
+
+def test_one_that_was_stopped_takes_old_copies_for_what_they_are() -> None:
+    """Three seconds of them wait: they agreed with the plan when they were sent, and it is flown at once."""
+    rig = Rig()
+    rig.run(0.5)
+    waiting: list[Datagram] = []
+    while rig.now < BEGIN + 3_500_000:
+        waiting += rig._inbox()
+        rig.now += TICK
+    rig.copies = False
+    rig.pilot.step(rig.now, waiting)
+    rig.run(0.2)
+    assert len(rig.heard(SetpointLocal)) >= 4
 
 
 def test_the_autopilots_link_is_read_only_while_nothing_is_copied() -> None:
@@ -239,7 +253,7 @@ def test_the_stamps_follow_the_companions() -> None:
     rig = Rig(KEY)
     ahead = Signing(KEY)
     ahead.present(BEGIN + 60 * SECOND)
-    rig.pilot.step(rig.now, [Datagram("copies", Copies(0, ahead.newest).pack())])
+    rig.pilot.step(rig.now, [Datagram("copies", Copies(BEGIN, ahead.newest).pack())])
     out = rig.pilot.step(rig.now + 2 * SECOND, [])
     reader = Signing(KEY)
     reader.resume(ahead.newest)

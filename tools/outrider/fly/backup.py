@@ -124,8 +124,9 @@ class Backup:
     def _discard(self) -> None:
         if self._process is None:
             return
-        if self._process.status is None:
+        if self._process.status is None and self._over is None:
             self._process.kill()
+        # One that is over still writes its log.
         self._process.join()
         self._receive()
         self._desk.close()

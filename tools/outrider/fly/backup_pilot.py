@@ -49,8 +49,12 @@ class Backup(Protocol):
         """Return whether no plan is flown, or it has been at rest for ``settling`` at ``now`` (µs)."""
         ...
 
-    def advance(self, now: int, messages: Sequence[Message]) -> list[Datagram]:
-        """Do a step at ``now`` (µs) with ``messages``."""
+    def receive(self, now: int, messages: Sequence[Message]) -> None:
+        """Receive ``messages`` that were sent at ``now`` (µs)."""
+        ...
+
+    def advance(self, now: int) -> list[Datagram]:
+        """Do a step at ``now`` (µs)."""
         ...
 
 
@@ -97,27 +101,31 @@ class BackupPilot:
         """Receive copies and messages; return what the backup node sends at ``now`` (µs)."""
         if self._signing is not None:
             self._signing.present(now)
-        messages = self._messages(now, inbox)
+        for link, data in inbox:
+            if link == _COPIES:
+                self._heard = now
+                copies = unpack(data)
+                self._receive(copies.time, self._copied(copies))
+            elif link == "autopilot":
+                self._receive(now, self._read.feed(data))
         self._heard = now if self._heard is None else self._heard
         self.deaf = self.gone or now - self._heard > DEAF_US
-        leaving = self._backup.advance(now, messages)
+        leaving = self._backup.advance(now)
         if self.gone and not self.over:
             leaving += self._farewell(now)
             leaving += self._end(now, [datagram for datagram in inbox if datagram.link == "autopilot"])
         return leaving
 
-    def _messages(self, now: int, inbox: Sequence[Datagram]) -> list[Message]:
-        found: list[Message] = []
-        for link, data in inbox:
-            if link == _COPIES:
-                self._heard = now
-                found += self._copied(unpack(data))
-            elif link == "autopilot":
-                found += self._read.feed(data)
-        for message in found:
+    def silence(self, now: int) -> int:
+        """Return the time (µs) since the last copy."""
+        return 0 if self._heard is None else now - self._heard
+
+    def _receive(self, now: int, messages: list[Message]) -> None:
+        """Receive messages of the companion or its autopilot, sent at ``now`` (µs)."""
+        self._backup.receive(now, messages)
+        for message in messages:
             if isinstance(message, Heartbeat):
                 self._beat = message
-        return found
 
     def _copied(self, copies: Copies) -> list[Message]:
         if self._signing is not None:

@@ -33,6 +33,8 @@ KEPT: Final = ("autopilot", "swarm")
 
 A serial port cannot be opened a second time.
 """
+_HUNG_US: Final = 6_000_000
+"""Time without a copy after which a companion without a parent counts as gone (µs)."""
 _REPORT_US: Final = 500_000
 """Time between two reports to the parent (µs)."""
 
@@ -100,13 +102,16 @@ class BackupWorker:
 
         def stepped(now: int) -> bool:
             nonlocal next_report
-            # The companion flies no more if the parent says so, or if its end of the socket is closed.
-            pilot.gone = pilot.gone or orders.stop or self._copies.ended
+            # The companion flies no more if the parent says so, if its end of the socket is closed, or if it
+            # hangs and no parent is left to end it.
+            orphan = os.getppid() != self._parent
+            hangs = orphan and pilot.silence(now) > _HUNG_US
+            pilot.gone = pilot.gone or orders.stop or self._copies.ended or hangs
             self._wiring.release_unplugged()
             if now >= next_report:
                 next_report = now + _REPORT_US
                 orders.tell(kind="backup", carried=pilot.carried)
-            if pilot.over and not orders.stop and os.getppid() == self._parent:
+            if pilot.over and not orders.stop and not orphan:
                 # The parent is told again when it asks.
                 return False
             return pilot.over
