@@ -29,12 +29,8 @@ def pulled(apart: float, outside: float, *, shares: bool, epochs: int = 20) -> f
     """How near (m) plans come to one that stands ``apart`` m east, from which 2 m are to be kept, when their
     goal is where that one stands; one of the two is ``outside`` its tube."""
     kept, goal = commitment(), HERE + apart * EAST
-    others = Others(
-        kept.own()[None],
-        np.broadcast_to(goal, (1, STEPS, 3, 3)),
-        np.full((1, STEPS), 2.0),
-        np.array([shares]),
-    )
+    there, distance = np.broadcast_to(goal, (1, STEPS, 3, 3)), np.full((1, STEPS), 2.0)
+    others = Others(kept.own()[None], there, distance, np.array([shares]))
     objective = Objective(np.broadcast_to(goal, (STEPS, 3)), np.zeros((STEPS, 3)), np.zeros((STEPS, 3)))
     least = np.inf
     for epoch in range(epochs):
@@ -48,7 +44,7 @@ def pulled(apart: float, outside: float, *, shares: bool, epochs: int = 20) -> f
 
 @pytest.mark.parametrize("outside", [0.0, 0.3, 1.0])
 def test_new_plans_keep_so_much_more_on_their_own_side(outside: float) -> None:
-    """Of an agreement on plans 6 m apart each side has half of what is more than 2 m: up to 4 m from the other."""
+    """Of plans that are agreed on 6 m apart, each side has half of the room beyond 2 m."""
     assert pulled(6.0, outside, shares=True) == pytest.approx(4.0 + outside, abs=0.02)
     assert pulled(6.0, outside, shares=False) >= 2.0 + outside - 0.02
 
