@@ -3,17 +3,18 @@
 An agreement of two vehicles names one plan of each, by the epochs at which these begin. Both compute the same
 separating planes from the two plans, and keep to their own sides of them.
 
-Sizes in bytes, little endian: kind 1, flags 1 (bit 0: farewell, bit 1: away), fingerprint of the
-fleet's common settings 4, epoch 7 (µs), since 7 (µs), then the entries. An entry: peer 1, flags and number 1
-(bit 7: departed, bits 0–3: number of agreements), then the newest considered agreement and the agreements,
-each 7 + 7 (µs: epoch of the sender's plan, epoch of the peer's plan). An agreement that is considered and is
-the only one is written once (bit 6).
+Sizes in bytes, little endian: kind 1, flags 1 (bit 0: farewell, bit 1: away, bits 2–7: ``outside``, in units
+of 0.05 m, rounded up, at most 63 of them), fingerprint of the fleet's common settings 4, epoch 7 (µs), since
+7 (µs), then the entries. An entry: peer 1, flags and number 1 (bit 7: departed, bits 0–3: number of
+agreements), then the newest considered agreement and the agreements, each 7 + 7 (µs: epoch of the sender's
+plan, epoch of the peer's plan). An agreement that is considered and is the only one is written once (bit 6).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from math import ceil
 from struct import Struct
 from struct import error as StructError  # noqa: N812
 from typing import NamedTuple
@@ -28,6 +29,7 @@ LARGEST = 128
 MOST_AGREEMENTS = 6
 """Largest number of agreements of an entry."""
 _FAREWELL, _AWAY = 1, 2
+_OUTSIDE_BIT, _OUTSIDE_UNIT, _OUTSIDE_MOST = 2, 0.05, 63
 _DEPARTED, _ONE, _NUMBER = 0x80, 0x40, 0x0F
 _HEADER = Struct("<BBI7s7s")
 _ENTRY = Struct("<BB")
@@ -59,7 +61,7 @@ class Statement(NamedTuple):
     before; agreements on an older plan of the sender are void. ``farewell``: the plan of ``epoch`` is the
     sender's last before another ``since``; the entries' ``considered`` name the newest plans of the peers
     that it holds. ``away``: the sender's vehicle is flown by another controller, and need not keep to its
-    plan.
+    plan. ``outside`` (m): by how much its distance from its plan exceeds the tube.
     """
 
     fingerprint: int
@@ -68,12 +70,14 @@ class Statement(NamedTuple):
     entries: tuple[Entry, ...] = ()
     farewell: bool = False
     away: bool = False
+    outside: float = 0.0
 
 
 def pack(statement: Statement) -> bytes:
     """Encode ``statement``; raise PlanWireError for a value that does not fit, and for too many entries."""
     try:
         flags = (_FAREWELL if statement.farewell else 0) | (_AWAY if statement.away else 0)
+        flags |= _units(statement.outside) << _OUTSIDE_BIT
         epochs = _epoch(statement.epoch), _epoch(statement.since)
         parts = [_HEADER.pack(KIND, flags, statement.fingerprint, *epochs)]
         parts += [_packed(entry) for entry in statement.entries]
@@ -94,14 +98,23 @@ def unpack(data: bytes) -> Statement:
     if not _HEADER.size <= len(data) <= LARGEST:
         raise PlanWireError(f"{len(data)} bytes are not a statement of agreements")
     kind, flags, fingerprint, epoch, since = _HEADER.unpack_from(data)
-    if kind != KIND or flags & ~(_FAREWELL | _AWAY):
-        raise PlanWireError(f"kind {kind} with flags {flags} is not a statement of kind {KIND}")
+    if kind != KIND:
+        raise PlanWireError(f"kind {kind} is not a statement of kind {KIND}")
     entries, at = [], _HEADER.size
     while at < len(data):
         entry, at = _unpacked(data, at)
         entries.append(entry)
     farewell, away = bool(flags & _FAREWELL), bool(flags & _AWAY)
-    return Statement(fingerprint, _read(epoch), _read(since), tuple(entries), farewell, away)
+    outside = (flags >> _OUTSIDE_BIT) * _OUTSIDE_UNIT
+    return Statement(fingerprint, _read(epoch), _read(since), tuple(entries), farewell, away, outside)
+
+
+def _units(outside: float) -> int:
+    """Return ``outside`` (m) in units of the wire, rounded up."""
+    if not outside >= 0.0:
+        raise ValueError(f"{outside} m is not a distance")
+    # The tolerance lets a decoded value give the same number again.
+    return ceil(min(outside / _OUTSIDE_UNIT - 1e-6, _OUTSIDE_MOST))
 
 
 def in_messages(statement: Statement) -> list[Statement]:

@@ -222,6 +222,11 @@ class Agreements:
                     found[system] = end
         return found
 
+    @property
+    def outside(self) -> float:
+        """Largest distance (m) by which a member has left its tube, by its newest statement."""
+        return max((peer.outside for peer in self._peers.values() if peer.left is None), default=0.0)
+
     def kept(self) -> dict[int, tuple[Agreement, ...]]:
         """Return the agreements that the own plans keep, by system id, without those of departed vehicles."""
         return {system: peer.pair.kept for system, peer in self._peers.items() if peer.left is None}

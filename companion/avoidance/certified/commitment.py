@@ -122,15 +122,19 @@ class Commitment:
         """
         return self._carried()[0]
 
-    def replan(self, objective: Objective, goal: Subgoal, others: Others) -> bool:
+    def replan(self, objective: Objective, goal: Subgoal, others: Others, outside: float = 0.0) -> bool:
         """Make the next epoch's plan; return False if none was found and the old plan is carried on.
 
-        ``goal`` is where the progress of the plan's end is measured.
+        ``goal`` is where the progress of the plan's end is measured. ``outside`` (m): by how much a vehicle
+        has left its tube; so much more distance is kept on the own side of each plane, where the committed
+        plan does.
 
         Raises CompanionError without a committed plan.
         """
         start, own = self._carried()
-        corridor = planes(own, others, self._config.spare, upright=self._planar)
+        # Of the distance beyond the least one, an agreement leaves each side a half.
+        spare = self._config.spare + 2.0 * outside
+        corridor = planes(own, others, spare, upright=self._planar)
         state = State(
             start.position_m, start.velocity_m_s, self._last_acceleration(), start.accelerations_m_s2
         )

@@ -65,7 +65,8 @@ class CertifiedFlight:
         """Distance (m) of the vehicle from its plan: ``deviation`` now, ``largest_deviation`` at most."""
         self.left_tube = 0
         """Number of times that the vehicle left the tube."""
-        self._outside = self._in_control = self._announced = self._received = self._participated = False
+        self._outside = 0.0
+        self._in_control = self._announced = self._received = self._participated = False
         self._turn = 0
         self._polled_at: int | None = None
         self._next_announcement = 0
@@ -151,7 +152,9 @@ class CertifiedFlight:
     def watch(self, now: int, measured: Motion) -> None:
         """Record how far the vehicle is from its plan.
 
-        Outside the tube the guarantee is suspended; the plan stays, because the autopilot returns to it.
+        Outside the tube the guarantee is suspended; the plan stays, because the autopilot returns to it. The
+        statements give the excess, and until the vehicle is back, it and the others keep so much more
+        distance in new plans, where their committed plans do.
         """
         horizon = self.commitment.horizon()
         if horizon is None:
@@ -159,8 +162,8 @@ class CertifiedFlight:
         difference = horizon.at(now).position - measured.position
         self.deviation = float(np.sqrt(difference @ difference))
         self.largest_deviation = max(self.largest_deviation, self.deviation)
-        outside = self.deviation > self._config.certified.tube
-        self.left_tube += outside and not self._outside
+        outside = max(0.0, self.deviation - self._config.certified.tube)
+        self.left_tube += outside > 0.0 and not self._outside
         self._outside = outside
 
     @property
@@ -181,7 +184,7 @@ class CertifiedFlight:
         subgoal = self._subgoal(now, epoch, own[-1, 2], aim.destination)
         goal = self._deadlock_turn.turned(start.position_m, subgoal.place)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
-        return commitment.replan(objective, subgoal, others)
+        return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 
     def _subgoal(self, now: int, epoch: int, rest: Array, destination: Array) -> Subgoal:
         """Return where the plan should end: ``destination`` (3,), m, or a place on a way round to it."""
@@ -274,5 +277,7 @@ class CertifiedFlight:
         if not every and not agreements.changed:
             return []
         entries = agreements.entries(every=every)
-        statement = Statement(agreements.fingerprint, epoch, agreements.since, entries, farewell)
+        statement = Statement(
+            agreements.fingerprint, epoch, agreements.since, entries, farewell, outside=self._outside
+        )
         return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(part)) for part in in_messages(statement)]

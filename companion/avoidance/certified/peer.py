@@ -22,10 +22,11 @@ class Peer:
 
     ``names``: the vehicles of its entries, and whether it has accepted their farewells. ``left``: the last
     plan of a peer whose farewell is accepted. ``departed``: so it is, or was until an own farewell that still
-    lasts, with no later plan or statement of it. ``away``: another
-    controller flies it. ``contradicted``: it has sent two plans of one epoch, and no agreement was confirmed
-    since. ``last_received``: time (µs) of its last plan or statement. ``round_trip`` (µs): from a proposal to
-    its answer. ``changed``: the entry about it has changed since it was last stated.
+    lasts, with no later plan or statement of it. ``away``: another controller flies it. ``outside``: by how
+    much (m) its distance from its plan exceeds the tube. ``contradicted``: it has sent two plans of one
+    epoch, and no agreement was confirmed since. ``last_received``: time (µs) of its last plan or statement.
+    ``round_trip`` (µs): from a proposal to its answer. ``changed``: the entry about it has changed since it
+    was last stated.
     """
 
     def __init__(self, own: int, system: int) -> None:
@@ -34,6 +35,7 @@ class Peer:
         self.names: dict[int, bool] = {}
         self.left: StoredPlan | None = None
         self.departed = self.away = self.contradicted = False
+        self.outside = 0.0
         self.last_received: int | None = None
         self.last_payload = b""
         self.round_trip = _ROUND_TRIP_US
@@ -129,6 +131,7 @@ class Peer:
         if statement.epoch < self._statement_epoch:
             return False
         self._statement_epoch, self.away = statement.epoch, statement.away
+        self.outside = statement.outside
         before = dict(self.names)
         self.names.update({one.peer: one.departed for one in statement.entries if one.peer != self._own})
         return self.names != before

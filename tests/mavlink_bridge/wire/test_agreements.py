@@ -37,7 +37,23 @@ def entries(draw: st.DrawFn) -> Entry:
 
 def statements(most: int) -> st.SearchStrategy[Statement]:
     some = st.lists(entries(), max_size=most).map(tuple)
-    return st.builds(Statement, st.integers(0, 2**32 - 1), times, times, some, st.booleans())
+    outside = st.integers(0, 63).map(lambda units: units * 0.05)
+    both = st.booleans()
+    return st.builds(Statement, st.integers(0, 2**32 - 1), times, times, some, both, both, outside)
+
+
+@pytest.mark.parametrize(
+    ("outside", "read"), [(1e-9, 0.0), (0.001, 0.05), (0.06, 0.1), (3.15, 3.15), (1e300, 3.15)]
+)
+def test_a_distance_outside_the_tube_is_rounded_up_as_far_as_it_fits(outside: float, read: float) -> None:
+    statement = Statement(7, 5, 5, outside=outside)
+    assert unpack(pack(statement)).outside == pytest.approx(read)
+
+
+@pytest.mark.parametrize("outside", [-0.1, float("nan")])
+def test_what_is_no_distance_is_not_sent(outside: float) -> None:
+    with pytest.raises(PlanWireError):
+        pack(Statement(7, 5, 5, outside=outside))
 
 
 def size(entry: Entry) -> int:

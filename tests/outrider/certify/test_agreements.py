@@ -420,3 +420,13 @@ def test_a_list_that_lacks_one_statement_is_certified_or_found(data: st.DataObje
     late = [epoch for epoch, number in firsts.items() if number in lost and epoch != at(0)]
     dropped = [finding for finding in verdict.findings if finding.what == "an agreement dropped"]
     assert len(dropped) == len(late)
+
+
+def test_how_often_vehicles_left_their_tubes_is_counted() -> None:
+    """11 is outside in the epochs 1 and 2, and in 4."""
+    whole = swarm()
+    for number, outside in ((1, 0.1), (2, 0.35), (4, 0.05)):
+        whole = changed(whole, 11, at(number), lambda s, outside=outside: s._replace(outside=outside))  # type: ignore[misc]
+    document = judge(whole).document()
+    assert (document["outside_tube"], document["most_outside_m"]) == (2, 0.35)
+    assert judge(swarm()).document()["outside_tube"] == 0

@@ -58,6 +58,7 @@ def show(name: str, verdict: Verdict) -> None:
         "plans carried on": len(verdict.steps(Kind.CARRIED_ON)),
         "anchors": len(anchors),
         "farewells": sum(len(history.leaves) for history in verdict.histories),
+        "times outside a tube, and by how much at most, m": f"{verdict.outside[0]}, {verdict.outside[1]:.2f}",
         "damaged records": verdict.damaged,
         "findings": len(verdict.findings),
     }

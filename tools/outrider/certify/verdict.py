@@ -16,7 +16,8 @@ class Verdict(NamedTuple):
 
     ``agreements``: number of them, each counted once for the two vehicles that list it. ``kept``: number of
     pairs of a plan and an agreement that was checked. ``began``: the first epoch (µs), from which seconds are
-    counted.
+    counted. ``outside``: how often the vehicles left their tubes, by their own statements, and by how much at
+    most (m); the guarantee is suspended in that time.
     """
 
     histories: tuple[History, ...]
@@ -26,6 +27,7 @@ class Verdict(NamedTuple):
     required: float
     damaged: int
     began: int
+    outside: tuple[int, float]
     findings: tuple[Finding, ...]
 
     @property
@@ -71,6 +73,8 @@ class Verdict(NamedTuple):
             "carried_on": len(self.steps(Kind.CARRIED_ON)),
             "anchors": len(self.steps(Kind.ANCHOR)),
             "farewells": sum(len(history.leaves) for history in self.histories),
+            "outside_tube": self.outside[0],
+            "most_outside_m": round(self.outside[1], 2),
             "damaged_records": self.damaged,
             "findings": [
                 {"what": f.what, "who": list(f.who), "when_s": self.seconds(f.time), "figures": f.figures}
@@ -103,8 +107,22 @@ def judge(evidence: Evidence) -> Verdict:
         terms.required,
         damaged,
         began,
+        _outside(logs),
         tuple(findings),
     )
+
+
+def _outside(logs: tuple[Log, ...]) -> tuple[int, float]:
+    """Return how often vehicles left their tubes by their own statements, and by how much (m) at most."""
+    number, most = 0, 0.0
+    for log in logs:
+        before = 0.0
+        for one in log.statements:
+            if one.sender == log.owner and not one.statement.away:
+                number += before == 0.0 < one.statement.outside
+                before = one.statement.outside
+                most = max(most, before)
+    return number, most
 
 
 def _listed(
