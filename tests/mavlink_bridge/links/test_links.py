@@ -473,15 +473,18 @@ def test_a_fork_that_takes_over_changes_nothing_for_the_other() -> None:
     (read, write), (told, tell) = os.pipe(), os.pipe()
     child = os.fork()
     if not child:
-        assert isinstance(here, StreamLink)
-        here.take_over()
-        found = gather(here, bool)
-        here.send(frames[1])
-        os.write(tell, b"1" if found == [frames[0]] else b"0")
-        # The other reads only now.
-        os.read(read, 1)
-        here.close()
-        os._exit(0)
+        found: list[bytes] = []
+        try:
+            assert isinstance(here, StreamLink)
+            here.take_over()
+            found = gather(here, bool)
+            here.send(frames[1])
+        finally:
+            os.write(tell, b"1" if found == [frames[0]] else b"0")
+            # The other reads only now.
+            os.read(read, 1)
+            here.close()
+            os._exit(0)
     there.send(frames[0])
     assert os.read(told, 1) == b"1"
     assert gather(there, bool) == [frames[1]]
