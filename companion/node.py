@@ -18,7 +18,7 @@ from companion.flight.state_machine import Pilot
 from companion.goals.goals import Goals
 from companion.health_checks import HealthChecks, report_silence
 from companion.planning.avoidance import Avoidance, Tally
-from companion.planning.certified import CertifiedAvoidance
+from companion.planning.certified import CertifiedAvoidance, VehicleParts
 from companion.planning.field import FieldAvoidance
 from companion.planning.fleet_time import FleetTimeAvoidance
 from companion.planning.plan_times import PlanTimes
@@ -85,11 +85,9 @@ class Companion:
         self.avoidance: Avoidance
         if config.avoidance == "field":
             self.avoidance = FieldAvoidance(config, world, pilot, times)
-        elif self._fleet_clock is None:
-            self.avoidance = CertifiedAvoidance(config, own, fleet, world, pilot, times)
         else:
-            clock = self._fleet_clock
-            self.avoidance = FleetTimeAvoidance(config, own, fleet, world, pilot, times, clock)
+            parts, clock = VehicleParts(config, own, fleet, world, pilot, times), self._fleet_clock
+            self.avoidance = CertifiedAvoidance(parts) if clock is None else FleetTimeAvoidance(parts, clock)
         self._goals = Goals(config, system, pilot, self.avoidance.lookahead_s)
         self._orders = Orders(config, own, fleet, pilot, self._goals)
         self._planning = Planning(config, world, pilot, self._goals, self.avoidance)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from companion.avoidance.certified.commitment import HoldReason
 from companion.avoidance.certified.committed import rest_time
 from companion.avoidance.certified.flight import CertifiedFlight
@@ -22,6 +24,17 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
 
 
+class VehicleParts(NamedTuple):
+    """Parts of one companion that its certified avoidance uses: settings, identity, inputs and stopwatch."""
+
+    config: CompanionConfig
+    own: Source
+    fleet: FleetFrame
+    world: World
+    pilot: Pilot
+    times: PlanTimes
+
+
 class CertifiedAvoidance:
     """``Avoidance`` by the committed plans of one vehicle.
 
@@ -32,17 +45,9 @@ class CertifiedAvoidance:
     failing: int | None = None
     state = Holding.FRESH
 
-    def __init__(
-        self,
-        config: CompanionConfig,
-        own: Source,
-        fleet: FleetFrame,
-        world: World,
-        pilot: Pilot,
-        times: PlanTimes,
-    ) -> None:
-        self._config, self._world, self._pilot, self._times = config, world, pilot, times
-        self._flight = CertifiedFlight(config, own, fleet)
+    def __init__(self, parts: VehicleParts) -> None:
+        self._config, own, fleet, self._world, self._pilot, self._times = parts
+        self._flight = CertifiedFlight(self._config, own, fleet)
         self.lookahead_s = self._flight.lookahead_s
         self.tracking = Tracking(TrackingConfig(compensate=False, usual=None, alarm=None))
         self.horizon: Horizon | None = None

@@ -9,17 +9,13 @@ import numpy as np
 from companion.avoidance.certified.commitment import HoldReason
 from companion.avoidance.certified.fleet_clock import FleetClock
 from companion.avoidance.certified.flight import CertifiedFlight
-from companion.config import CompanionConfig
-from companion.flight.state_machine import Pilot
 from companion.planning.avoidance import AvoidanceInputs
-from companion.planning.certified import CertifiedAvoidance
+from companion.planning.certified import CertifiedAvoidance, VehicleParts
 from companion.planning.fleet_time_world import FleetTimeWorld
-from companion.planning.plan_times import PlanTimes
 from companion.values.horizon import Array, Motion, roll_out
 from companion.values.refused_senders import RefusedSenders
 from companion.world import World
-from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
+from mavlink_bridge.messages import Message, Timesync, Tunnel
 from mavlink_bridge.wire.fleet_time import PAYLOAD_TYPE
 
 _CHECK_US = 100_000
@@ -33,19 +29,10 @@ class FleetTimeAvoidance(CertifiedAvoidance):
     good enough, it carries its plan on (``HoldReason.CLOCK``).
     """
 
-    def __init__(
-        self,
-        config: CompanionConfig,
-        own: Source,
-        fleet: FleetFrame,
-        world: World,
-        pilot: Pilot,
-        times: PlanTimes,
-        clock: FleetClock,
-    ) -> None:
+    def __init__(self, parts: VehicleParts, clock: FleetClock) -> None:
         # Constraints are made of a part of the world only, and ``FleetTimeWorld`` has this part.
-        super().__init__(config, own, fleet, cast(World, FleetTimeWorld(world, clock)), pilot, times)
-        self._own, self._fleet, self._clock = own, fleet, clock
+        super().__init__(parts._replace(world=cast(World, FleetTimeWorld(parts.world, clock))))
+        self._own, self._fleet, self._clock = parts.own, parts.fleet, clock
         self._next_check = 0
 
     def begin(self, now: int, measured: Motion) -> None:

@@ -1,4 +1,4 @@
-"""Fleet time of one companion: its own clock, corrected by what its sources and its peers say.
+"""Fleet time of one companion: its own clock, corrected by its sources and by messages of its peers.
 
 Fleet time must not jump under a plan that others rely on: it runs up to 500 ppm faster or slower than the own
 clock while its error is within ``clock_us``, and up to 1 % beyond. It jumps only while no plan has been
@@ -52,7 +52,7 @@ class FleetClock:
         """Why no plans are to be made; None while fleet time is good enough."""
         self.error = 0
         """Largest error (µs) that ``ahead`` may have, by the last estimate; 0 without one."""
-        self._told: Estimate | None = None
+        self._shared: Estimate | None = None
         self._estimate: Offset | None = None
         self._stepped = self._next = self._next_message = 0
 
@@ -93,7 +93,7 @@ class FleetClock:
         found: list[Message] = [*self.peers.messages(now)]
         if now >= self._next_message:
             self._next_message = now + _REPEAT_US
-            payload = pack(FleetTime(now, self.ahead, self._told))
+            payload = pack(FleetTime(now, self.ahead, self._shared))
             found.append(Tunnel(self._own, 0, 0, PAYLOAD_TYPE, payload))
         return found
 
@@ -151,8 +151,8 @@ class FleetClock:
         contradicted = (
             local is not None and found is not None and local.narrowed(found, settings.drift_ppm) is None
         )
-        tellable = local is not None and not contradicted and local.bound <= _MAX_BOUND_US
-        self._told = Estimate(local.middle, local.bound) if tellable and local is not None else None
+        shareable = local is not None and not contradicted and local.bound <= _MAX_BOUND_US
+        self._shared = Estimate(local.middle, local.bound) if shareable and local is not None else None
         return len(sources), found
 
     def _own_sources(self, now: int) -> list[Offset]:

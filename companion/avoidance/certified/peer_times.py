@@ -1,6 +1,6 @@
-"""What the companions of the fleet say of fleet time, on the own clock.
+"""Fleet time by the messages of the other companions, on the own clock.
 
-Each companion tells fleet time relative to its own clock (TUNNEL 0xDC04); round trips (``ClockWatch``) bound
+Each companion sends fleet time relative to its own clock (TUNNEL 0xDC04); round trips (``ClockWatch``) bound
 that clock on the own one.
 """
 
@@ -22,7 +22,7 @@ _MAX_OFFSET_US = 1 << 60
 """Offsets beyond it cannot be meant, and sums with them would not fit the wire."""
 
 
-class _Told(NamedTuple):
+class _Received(NamedTuple):
     message: FleetTime
     at: int
 
@@ -36,9 +36,9 @@ class PeerTimes:
     def __init__(self, own: Source, fleet: Set[int], config: TimeSourcesConfig) -> None:
         self._own, self._fleet = own, fleet
         self._drift, self._lateness = config.drift_ppm, config.lateness_us
-        # Its own judgement is not used: the clocks themselves may differ by any amount.
+        # ``ClockWatch.wrong`` is not used: the clocks themselves may differ by any amount.
         self._clocks = ClockWatch(own, 0)
-        self._told: dict[int, _Told] = {}
+        self._received: dict[int, _Received] = {}
         self._replies: list[Timesync] = []
         self.refused = 0
         """Number of messages that could not be decoded, or give impossible values."""
@@ -59,14 +59,14 @@ class PeerTimes:
         if self._fleet and system not in self._fleet:
             return
         try:
-            told = unpack(message.payload)
+            received = unpack(message.payload)
         except PlanWireError:
             self.refused += 1
             return
-        if any(abs(value) > _MAX_OFFSET_US for value in (told.ahead or 0, *(told.estimate or ()))):
+        if any(abs(value) > _MAX_OFFSET_US for value in (received.ahead or 0, *(received.estimate or ()))):
             self.refused += 1
             return
-        self._told[system] = _Told(told, now)
+        self._received[system] = _Received(received, now)
 
     def messages(self, now: int) -> list[Timesync]:
         """Return the replies to requests, and the own request if it is due at ``now`` (µs)."""
@@ -83,9 +83,9 @@ class PeerTimes:
         return Offset(*bounds).aged(now, self._drift).shifted(-self._lateness, self._lateness)
 
     def estimates(self, now: int) -> list[Offset]:
-        """Return what each of the others' own sources say fleet time is ahead of the own clock."""
+        """Return fleet time ahead of the own clock, by the own sources of each of the others."""
         found = []
-        for system, (message, at) in self._told.items():
+        for system, (message, at) in self._received.items():
             clock = self.clock(now, system)
             if message.estimate is None or clock is None or now - at > _MAX_AGE_US:
                 continue
@@ -93,8 +93,8 @@ class PeerTimes:
             age = now + clock.most - message.time
             if 0 <= age <= _MAX_AGE_US:
                 ahead, bound = message.estimate
-                told = Offset(ahead - bound, ahead + bound, now - age).aged(now, self._drift)
-                found.append(clock.shifted(told.least, told.most))
+                offset = Offset(ahead - bound, ahead + bound, now - age).aged(now, self._drift)
+                found.append(clock.shifted(offset.least, offset.most))
         return found
 
     def differences(self, now: int, ahead: int) -> dict[int, ClockBounds]:
@@ -103,7 +103,7 @@ class PeerTimes:
         ``ahead`` (µs): own fleet time minus own time.
         """
         found = {}
-        for system, (message, at) in self._told.items():
+        for system, (message, at) in self._received.items():
             clock = self.clock(now, system)
             if message.ahead is not None and clock is not None and now - at <= _MAX_AGE_US:
                 between = clock.shifted(message.ahead - ahead, message.ahead - ahead)

@@ -168,7 +168,7 @@ def test_an_agreement_names_plans_that_both_were_told() -> None:
     verdict = judge(changed(swarm(), 11, at(3), lambda statement: with_entry(statement, ahead)))
     assert set(found(verdict)) >= {
         ("an agreement on a plan newer than the own one", (11, 12)),
-        ("an agreement on a plan that was not heard", (11, 12)),
+        ("an agreement on a plan that was not received", (11, 12)),
     }
 
     def nowhere(entry: Entry) -> Entry:
@@ -382,7 +382,7 @@ def test_what_was_heard_must_have_been_stated() -> None:
         for log in whole.logs
     )
     verdict = judge(whole._replace(logs=lost))
-    assert ("a statement heard that its sender did not tell", (12, 11)) in found(verdict)
+    assert ("a statement received that its sender did not send", (12, 11)) in found(verdict)
 
 
 def test_a_statement_of_another_fleet_is_found_and_does_not_count() -> None:

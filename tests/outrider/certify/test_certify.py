@@ -139,7 +139,7 @@ def _without(whole: Evidence, owner: int, keep: Callable[[WirePlan], bool]) -> E
 def test_what_was_heard_must_have_been_told() -> None:
     whole = evidence({11: [A, on(A)], 12: [B, on(B)]})
     verdict = judge(_without(whole, 11, lambda plan: plan.epoch == BEGAN))
-    assert whats(verdict) == ["a plan heard that its sender did not tell"]
+    assert whats(verdict) == ["a plan received that its sender did not send"]
     assert verdict.findings[0].who == (11, 12)
 
 

@@ -87,8 +87,8 @@ def test_a_killed_companions_last_messages_are_in_the_log_of_its_backup_node(
     lost = verdict(run)
     assert not lost.certified
     assert {finding.what for finding in lost.findings} <= {
-        "a plan heard that its sender did not tell",
-        "a statement heard that its sender did not tell",
+        "a plan received that its sender did not send",
+        "a statement received that its sender did not send",
         "a plan without a statement",
     }
 

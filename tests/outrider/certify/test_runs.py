@@ -240,7 +240,7 @@ def test_lost_copies_change_nothing_but_a_lost_plan_is_found(run: Path, replay: 
     assert ended.status == 1
     (finding,) = json.loads(ended.out)["findings"]
     assert finding["who"] == [11, 12, 13]
-    assert "did not tell" in finding["what"]
+    assert "did not send" in finding["what"]
 
 
 def test_what_a_vehicle_has_not_heard_it_cannot_count_on(run: Path, replay: Replay) -> None:

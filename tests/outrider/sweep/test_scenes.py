@@ -18,6 +18,7 @@ from outrider.scenarios.scenario import Scenario
 from outrider.sweep.draw import draw, scene_parameters, vehicles
 from outrider.sweep.scenes import DECIDED, Scene
 from outrider.yaml_files.yaml_file import load, read
+from sitl.estimation.profiles import PROFILES
 
 SHIPPED = {path.stem: path for path in sorted((config_root() / "scenes").glob("*.yaml"))}
 SEEDS = st.integers(0, 2**31)
@@ -272,3 +273,26 @@ def test_what_the_scene_decides_cannot_be_given(key: str, dotted: bool) -> None:
         document = {part: document}
     with pytest.raises(ValueError, match=f"scenario: {key} is for the scene to decide"):
         scene(scenario=document)
+
+
+def struck(seed: int, **trouble: Any) -> dict[str, Any]:
+    """What ``draw`` gives for ``certified-fuzz`` with some of its troubles changed."""
+    base = load(SHIPPED["certified-fuzz"], Scene).model_dump(mode="json")["trouble"]
+    return draw(scene("certified-fuzz", trouble={**base, **trouble}), seed)
+
+
+def test_gusts_and_jumps_are_as_many_and_as_strong_as_the_scene_allows_and_change_nothing_else() -> None:
+    gusts, jumps = set(), set()
+    for seed in range(1, 41):
+        document, without = struck(seed), struck(seed, gusts=[0, 0], jumps=[0, 0])
+        sigma = PROFILES[document["sensors"]].worst_axis
+        blown = document["weather"].pop("gusts")
+        jumped = [fault for fault in document["faults"] if fault["kind"] == "gps_jump"]
+        assert all(np.linalg.norm(gust["velocity"]) <= 8.001 for gust in blown)
+        assert all(np.linalg.norm(fault["offset"]) <= 1.5 * sigma + 1e-3 for fault in jumped)
+        assert len({fault["vehicle"] for fault in jumped}) == len(jumped)
+        document["faults"] = [fault for fault in document["faults"] if fault not in jumped]
+        assert document == without
+        gusts.add(len(blown))
+        jumps.add(len(jumped))
+    assert gusts == jumps == {0, 1, 2}

@@ -103,7 +103,7 @@ def _disagreements(system: int, found: Sequence[LoggedPlan], *, logged: bool) ->
         findings.append(Finding("two plans told of one epoch", (system,), epoch, figures))
     if received and logged and not sent:
         hearers = tuple(sorted({sighting.owner for sighting in received}))
-        what = "a plan heard that its sender did not tell"
+        what = "a plan received that its sender did not send"
         return [Finding(what, (system, *hearers), received[0].time, f"its epoch is {epoch} µs")]
     reference = sent or [received[0].plan] if received else []
     for sighting in received:

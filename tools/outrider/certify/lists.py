@@ -113,7 +113,7 @@ class _Peer:
         if self._rank(one) <= self._rank(self._considered):
             yield "an agreement taken again", self._named(one)
         if one[1] not in self._plans:
-            yield "an agreement on a plan that was not heard", self._named(one)
+            yield "an agreement on a plan that was not received", self._named(one)
         if max(one) > statement.epoch:
             yield "an agreement on a plan newer than the own one", self._named(one)
 
@@ -153,7 +153,7 @@ def listings(
     sent = {other.system: {step.plan for step in other.steps} for other in others}
     made = {step.plan.epoch for step in history.steps if step.kind is Kind.MADE}
     named: dict[int, set[int]] = {epoch: set() for epoch in made}
-    unsaid = {
+    unstated = {
         step.plan.epoch: before.plan.epoch
         for before, step in pairwise(history.steps)
         if step.kind in (Kind.FIRST, Kind.ANCHOR)
@@ -180,7 +180,7 @@ def listings(
         elif sender != owner:
             peers.setdefault(sender, _Peer(owner, sender)).receive(statement)
         else:
-            before = unsaid.pop(statement.epoch, None)
+            before = unstated.pop(statement.epoch, None)
             if before is not None and statement.since <= before:
                 findings.append(Finding("a new beginning that is not stated", (owner,), statement.epoch, ""))
             if statement.farewell:
@@ -194,14 +194,14 @@ def listings(
                 who = owner, peer.system
                 wrong = peer.state(statement, entry)
                 findings += [Finding(what, who, record.time, figures) for what, figures in wrong]
-                told = named.get(statement.epoch)
-                if told is None or peer.system in told:
+                present = named.get(statement.epoch)
+                if present is None or peer.system in present:
                     continue
-                told.add(peer.system)
+                present.add(peer.system)
                 if not (entry.departed or statement.farewell or peer.agreed):
                     findings.append(Finding("a plan without an agreement", who, statement.epoch, ""))
-    for epoch, told in named.items():
-        silent = sorted(set(terms.fleet) - told - {owner})
-        if silent:
-            findings.append(Finding("a plan without a statement", (owner, *silent), epoch, ""))
+    for epoch, present in named.items():
+        unnamed = sorted(set(terms.fleet) - present - {owner})
+        if unnamed:
+            findings.append(Finding("a plan without a statement", (owner, *unnamed), epoch, ""))
     return [one for peer in peers.values() for one in peer.listings.values()], findings

@@ -130,16 +130,16 @@ def _listed(
 ) -> tuple[list[Listing], list[Finding]]:
     """Return the agreements in the lists of all vehicles, and what is wrong with the lists."""
     by_system = {one.system: one for one in histories}
-    told = {log.owner: {s.statement for s in log.statements if s.sender == log.owner} for log in logs}
+    sent = {log.owner: {s.statement for s in log.statements if s.sender == log.owner} for log in logs}
     listed, findings = [], []
     for log in logs:
-        heard: dict[int, list[int]] = {}
+        received: dict[int, list[int]] = {}
         for one in log.statements:
-            if one.sender in told and one.statement not in told[one.sender]:
-                heard.setdefault(one.sender, []).append(one.time)
+            if one.sender in sent and one.statement not in sent[one.sender]:
+                received.setdefault(one.sender, []).append(one.time)
         findings += [
-            Finding("a statement heard that its sender did not tell", (sender, log.owner), times[0], "")
-            for sender, times in heard.items()
+            Finding("a statement received that its sender did not send", (sender, log.owner), times[0], "")
+            for sender, times in received.items()
         ]
         own = by_system.get(log.owner)
         if own is not None:
@@ -169,7 +169,12 @@ def _absent(histories: list[History], logs: tuple[Log, ...], began: int) -> list
     """Return findings for vehicles without a readable log or without a plan."""
     owners = {log.owner for log in logs}
     findings = [
-        Finding("no log of its own that can be read", (one.system,), began, "its plans are as heard")
+        Finding(
+            "no log of its own that can be read",
+            (one.system,),
+            began,
+            "its plans are as received",
+        )
         for one in histories
         if one.system not in owners
     ]

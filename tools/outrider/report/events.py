@@ -9,17 +9,7 @@ from outrider.report.clocks import seconds
 from outrider.report.distances import Encounter
 from outrider.report.log_events import sayings
 from outrider.report.run import Log, Run
-from outrider.scenarios.faults import (
-    ClockStep,
-    Freeze,
-    FromStart,
-    GpsJump,
-    GpsLoss,
-    MotorFailure,
-    Sudden,
-    UtcStep,
-    Vanish,
-)
+from outrider.scenarios.faults import FromStart, description
 from outrider.scenarios.places import FixedTarget
 from outrider.scenarios.scenario import Scenario
 
@@ -101,7 +91,7 @@ def _scenario(scenario: Scenario) -> Iterator[Event]:
         if not isinstance(fault, FromStart):
             until = getattr(fault, "for_s", None)
             end = None if until is None else fault.at_s + until
-            yield Event(fault.at_s, "fault", (fault.vehicle,), _words(fault), end, bad=True)
+            yield Event(fault.at_s, "fault", (fault.vehicle,), description(fault), end, bad=True)
     for cut in scenario.partitions:
         text = f"the swarm link is cut around {', '.join(map(str, cut.members))}"
         yield Event(cut.at_s, "partition", cut.members, text, cut.at_s + cut.for_s, bad=True)
@@ -114,24 +104,6 @@ def _scenario(scenario: Scenario) -> Iterator[Event]:
     for system, other in zip(scenario.systems[scenario.vehicles :], scenario.bystanders, strict=True):
         if other.goal is not None:
             yield Event(other.after_s, "bystander", (system,), "sets out, and gives way to nobody")
-
-
-def _words(fault: Sudden) -> str:
-    if isinstance(fault, Freeze):
-        return "its companion hangs"
-    if isinstance(fault, Vanish):
-        return "its companion is gone for good"
-    if isinstance(fault, GpsLoss):
-        return "its position fix is lost"
-    if isinstance(fault, GpsJump):
-        return "its position fix is {:g}, {:g}, {:g} m off".format(*fault.offset)
-    if isinstance(fault, MotorFailure):
-        return f"rotor {fault.rotor} gives {100.0 * fault.left:g} % of its thrust from now on"
-    if isinstance(fault, UtcStep):
-        return f"its autopilot's UTC steps by {fault.step_ms:g} ms"
-    if isinstance(fault, ClockStep):
-        return f"its computer's system clock steps by {fault.step_ms:g} ms"
-    raise TypeError(fault)
 
 
 def _sent(log: Log, ahead: float) -> Iterator[Event]:

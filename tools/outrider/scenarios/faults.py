@@ -98,6 +98,25 @@ FromStart = ClockFault | AutopilotClockFault
 FaultPart = Annotated[Sudden | FromStart, Field(discriminator="kind")]
 
 
+def description(fault: Sudden) -> str:
+    """Return what happens to the vehicle of ``fault``, as text of an event."""
+    if isinstance(fault, Freeze):
+        return "its companion hangs"
+    if isinstance(fault, Vanish):
+        return "its companion is gone for good"
+    if isinstance(fault, GpsLoss):
+        return "its position fix is lost"
+    if isinstance(fault, GpsJump):
+        return "its position fix is {:g}, {:g}, {:g} m off".format(*fault.offset)
+    if isinstance(fault, MotorFailure):
+        return f"rotor {fault.rotor} gives {100.0 * fault.left:g} % of its thrust from now on"
+    if isinstance(fault, UtcStep):
+        return f"its autopilot's UTC steps by {fault.step_ms:g} ms"
+    if isinstance(fault, ClockStep):
+        return f"its computer's system clock steps by {fault.step_ms:g} ms"
+    raise TypeError(fault)
+
+
 class Clocks(Part):
     """Errors of the companions' clocks from the start: drawn per seed, uniform in ± these bounds."""
 

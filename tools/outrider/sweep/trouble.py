@@ -1,4 +1,4 @@
-"""Random disturbances of a drawn scenario: sensors, links, wind, clocks, companion faults and partitions.
+"""Random disturbances of a drawn scenario: sensors, links, wind, clocks, companion faults, partitions, jumps.
 
 Numbers and times are drawn uniformly within their bounds. Loss, delay and jitter are drawn as least + (most −
 least)·x³ with uniform x, because where nearly everything is lost no vehicle moves, and little is tested.
@@ -6,13 +6,14 @@ least)·x³ with uniform x, because where nearly everything is lost no vehicle m
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, JsonValue, model_validator
 
 from companion.config.certified import CertifiedConfig
 from outrider.scenarios.part import FIRST_SYSTEM, Part, Share
+from sitl.estimation.profiles import PROFILES
 
 Milliseconds = Annotated[float, Field(ge=0.0, le=5_000.0)]
 Seconds = Annotated[float, Field(gt=0.0, le=120.0)]
@@ -41,6 +42,14 @@ class Trouble(Part):
     partitions: tuple[Few, Few] = Field((0, 0), description="how often the swarm is divided in two")
     freezes: tuple[Few, Few] = Field((0, 0), description="how many companions hang for a while")
     vanishes: tuple[Few, Few] = Field((0, 0), description="how many companions vanish for good")
+    gusts: tuple[Few, Few] = Field((0, 0), description="how many gusts, of for_s")
+    gust: Annotated[float, Field(ge=0.0, le=30.0)] = Field(
+        0.0, description="largest speed of a gust, m/s; any horizontal direction"
+    )
+    jumps: tuple[Few, Few] = Field((0, 0), description="how many position fixes are off, each for for_s")
+    jump: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
+        0.0, description="largest offset of a position fix, in σ of the sensors; any horizontal direction"
+    )
     within_s: Seconds = Field(
         8.0, description="latest start of a fault after the goal event; longest pause before a partition"
     )
@@ -106,4 +115,37 @@ def strike(trouble: Trouble, count: int, random: np.random.Generator) -> dict[st
         partitions.append({"at_s": round(begins, 4), "for_s": lasts, "members": [*members]})
         begins += lasts
     document["partitions"] = partitions
+    _strike_estimates(trouble, document, order, random)
     return document
+
+
+def _strike_estimates(
+    trouble: Trouble, document: dict[str, Any], order: list[int], random: np.random.Generator
+) -> None:
+    """Add gusts to ``document``, and jumps of position fixes of vehicles in ``order``.
+
+    They are drawn last, so that without them the same seed gives the same scenario as before.
+    """
+
+    def beside(most: float) -> list[float]:
+        size, course = float(random.uniform(0.0, most)), float(random.uniform(-np.pi, np.pi))
+        return [round(size * float(np.cos(course)), 4), round(size * float(np.sin(course)), 4), 0.0]
+
+    def times() -> tuple[float, float]:
+        spans = (0.1, trouble.within_s), trouble.for_s
+        begins, lasts = (round(float(random.uniform(*span)), 4) for span in spans)
+        return begins, lasts
+
+    if trouble.gusts[1]:
+        gusts = []
+        for _ in range(int(random.integers(trouble.gusts[0], trouble.gusts[1] + 1))):
+            at_s, length_s = times()
+            gusts.append({"at_s": at_s, "length_s": length_s, "velocity": beside(trouble.gust)})
+        document["weather"]["gusts"] = gusts
+    if trouble.jumps[1]:
+        most = trouble.jump * PROFILES[document["sensors"]].worst_axis
+        number = int(random.integers(trouble.jumps[0], trouble.jumps[1] + 1))
+        for system in order[::-1][:number]:
+            at_s, for_s = times()
+            jump = {"kind": "gps_jump", "vehicle": system, "at_s": at_s, "for_s": for_s}
+            document["faults"].append({**jump, "offset": beside(most)})
