@@ -23,7 +23,7 @@ from companion.obstacles.alignment import align, extrapolate, within
 from companion.obstacles.reachable_ball import Ball, flown_on
 from companion.obstacles.relevance_filter import Ages, RelevanceFilter
 from companion.obstacles.shared_plans import SharedPlans
-from companion.obstacles.trusted_peers import TrustedPeers
+from companion.obstacles.trusted_peers import TrustedPeers, follows
 from companion.obstacles.uncertainty import ReportedUncertainty
 from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
@@ -210,8 +210,10 @@ class Neighbours:
 
     def _trusted_rows(self) -> NDArray[np.bool_]:
         """Return which rows (M,) are trusted for a while: vehicles with plans and limits like the own."""
-        plans = self._table.at(self._ids, self._times)
-        trusted = self._trusted.trusted(self.relevance.now, self._states, plans)
+        trusted = self._trusted.consistent(self.relevance.now)
+        if not trusted.any():
+            return trusted
+        trusted &= follows(self._states, self._table.at(self._ids, self._times))
         for system in self._moving_obstacles | self._uncertainty.systems(self.relevance.now):
             if system in self._rows:
                 trusted[self._rows[system]] = False

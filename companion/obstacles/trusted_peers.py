@@ -37,16 +37,23 @@ class TrustedPeers:
         """
         self._since[row] = now
 
-    def trusted(self, now: int, states: Array, plans: Located) -> NDArray[np.bool_]:
-        """Return which neighbours (M,) are trusted at ``now`` (µs).
+    def consistent(self, now: int) -> NDArray[np.bool_]:
+        """Return the neighbours (M,) whose tracks have accepted all measurements long enough at ``now`` (µs).
 
-        ``states`` (M, 6): their last states; ``plans``: the position that each neighbour had planned for the
-        time of its last state.
+        Those that also follow their plans (``follows``) are trusted.
         """
-        off = plans.positions - states[:, 0:3]
-        there = (
-            (plans.after >= -plans.dt)
-            & (plans.after <= _MAX_PLAN_AGE_US)
-            & (np.vecdot(off, off) <= _MAX_PLAN_OFFSET**2)
-        )
-        return np.asarray(there & (now - self._since >= _CONSISTENT_US))
+        return np.asarray(now - self._since >= _CONSISTENT_US)
+
+
+def follows(states: Array, plans: Located) -> NDArray[np.bool_]:
+    """Return which neighbours (M,) are near their plans.
+
+    ``states`` (M, 6): their last states; ``plans``: the position that each neighbour had planned for the time
+    of its last state.
+    """
+    off = plans.positions - states[:, 0:3]
+    return np.asarray(
+        (plans.after >= -plans.dt)
+        & (plans.after <= _MAX_PLAN_AGE_US)
+        & (np.vecdot(off, off) <= _MAX_PLAN_OFFSET**2)
+    )
