@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.avoidance.certified.committed import horizon_of, rest_time, rests
+from companion.avoidance.certified.committed import carried_on, horizon_of, rest_time, rests
 from companion.avoidance.certified.fingerprint import fingerprint
 from companion.config import CompanionConfig
 from companion.estimation.origins import Origins
@@ -47,7 +47,7 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
-from mavlink_bridge.wire.agreements import Statement
+from mavlink_bridge.wire.agreements import Entry, Statement, in_messages
 from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.codec import Accept, Codec
@@ -122,6 +122,7 @@ class BackupNode:
         self._next = self._next_beat = 0
         self._boot: int | None = None
         self._since = 0
+        self._entries: dict[int, Entry] = {}
         self.carried = 0
         """Number of set-points sent in place of the companion."""
 
@@ -182,16 +183,24 @@ class BackupNode:
         """Return the newest plan, and the statement that it is the companion's last one.
 
         To be sent on the swarm link once the companion's process has ended. Nothing without a flown plan, and
-        before the newest one has begun at ``now`` (µs) by the clocks of all.
+        before the newest one has begun at ``now`` (µs) by the clocks of all. The plan is carried on, because
+        old plans are not accepted; the entries are the last ones of the companion, by which the others know
+        that this farewell answers their own beginning.
         """
         if self._received is None or not self._plans:
             return []
-        plan = self._plans[max(self._plans)]
-        if now < plan.epoch + 2 * self._config.certified.clock_us:
+        plan, certified = self._plans[max(self._plans)], self._config.certified
+        begun = now - 2 * certified.clock_us
+        if begun < plan.epoch:
             return []
-        statement = Statement(fingerprint(self._config, self._fleet), plan.epoch, self._since, farewell=True)
-        tunnels = (PLAN, pack_plan(plan)), (AGREEMENTS, pack_statement(statement))
-        return [Tunnel(self._own, 0, 0, kind, payload) for kind, payload in tunnels]
+        plan = carried_on(plan, (begun - plan.epoch) // certified.epoch_us * certified.knots)
+        entries = tuple(entry._replace(agreements=()) for _, entry in sorted(self._entries.items()))
+        known = fingerprint(self._config, self._fleet)
+        statement = Statement(known, plan.epoch, self._since, entries, farewell=True)
+        return [
+            Tunnel(self._own, 0, 0, PLAN, pack_plan(plan)),
+            *(Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(part)) for part in in_messages(statement)),
+        ]
 
     def _heartbeat(self, now: int) -> list[Datagram]:
         """Return a heartbeat once a second: routers learn the route from it, and operators see the node."""
@@ -222,7 +231,10 @@ class BackupNode:
         try:
             if message.payload_type == AGREEMENTS:
                 statement = unpack_statement(message.payload)
-                self._since = max(self._since, statement.since)
+                if statement.since > self._since:
+                    self._since = statement.since
+                    self._entries.clear()
+                self._entries.update((entry.peer, entry) for entry in statement.entries)
                 if statement.farewell and not self._finishes:
                     self._forget()
             if message.payload_type != PLAN:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.avoidance.certified.committed import horizon_of, rest_time
+from companion.avoidance.certified.committed import carried_on, horizon_of, rest_time
 from companion.avoidance.certified.fingerprint import fingerprint
 from companion.backup_node import BACKUP, BackupNode
 from companion.config import CompanionConfig
@@ -144,9 +144,12 @@ def test_the_others_are_told_that_the_plan_is_the_last() -> None:
     assert {message.source for message in told} == {Source(SYSTEM, BACKUP)}
     plans = {unpack_plan(message.payload) for message in told if message.payload_type == PLAN}
     statements = {unpack_statement(m.payload) for m in told if m.payload_type == AGREEMENTS}
-    assert plans == {rig.plan}
+    # It is told on and on, as the same motion from the present epoch on: old plans are not accepted.
+    knots = sorted((plan.epoch - rig.plan.epoch) // rig.plan.dt for plan in plans)
+    assert len(knots) > 3
+    assert plans == {carried_on(rig.plan, knot) for knot in knots}
     known = fingerprint(CONFIG, FLEET)
-    assert statements == {Statement(known, rig.plan.epoch, 0, farewell=True)}
+    assert statements == {Statement(known, plan.epoch, 0, farewell=True) for plan in plans}
 
 
 def test_a_plan_that_has_not_begun_is_not_said_to_be_the_last() -> None:

@@ -24,6 +24,7 @@ from outrider.scene.changes import Change
 from outrider.scene.companion_snapshot import CompanionSnapshot, companion_snapshot
 from outrider.scene.view_commands import LOSSY, ViewCommands
 from outrider.simulation.disturbances import Event, events, strike_autopilot, strike_computer
+from outrider.simulation.ending_companion import EndingCompanion
 from outrider.simulation.fleet import Fleet
 from outrider.simulation.system_clocks import step_clock
 from outrider.simulation.truth_observer import MotionObserver, Motions
@@ -99,6 +100,11 @@ class Vehicles:
         self.autopilots = [fleet.autopilot(k) for k in self.indices]
         self.companions = [fleet.companion(k, stopwatch, EPOCH) for k in self.indices]
         self.backup_nodes = {k: fleet.backup_of(k) for k in self.indices if k in fleet.with_backup}
+        self._ending = {
+            fleet.systems[k]: EndingCompanion(companion, self.backup_nodes[k])
+            for k, companion in zip(self.indices, self.companions, strict=True)
+            if k in self.backup_nodes
+        }
         nodes: list[Node] = [*self.autopilots, *self.companions, *self.backup_nodes.values()]
         own = {node.name for node in nodes}
         if share.number == 0:
@@ -140,7 +146,7 @@ class Vehicles:
                 elsewhere=elsewhere,
             )
             by_system = dict(zip(self.systems, self.companions, strict=True))
-            computers = _Computers(loop, self.network, by_system)
+            computers = _Computers(loop, self.network, by_system, self._ending)
 
             def watched(now: int) -> bool | None:
                 self._strike_due(now, computers)
@@ -211,7 +217,8 @@ class Vehicles:
         nodes = []
         for k, (system, phase) in enumerate(zip(fleet.systems, fleet.phases(), strict=True)):
             autopilot = autopilots.get(k) or Elsewhere(names.autopilot(system))
-            companion = companions.get(k) or Elsewhere(names.companion(system))
+            ending, elsewhere = self._ending.get(system), Elsewhere(names.companion(system))
+            companion = ending or companions.get(k) or elsewhere
             nodes.append(Scheduled(autopilot, timing.autopilot_us, EPOCH))
             nodes.append(Scheduled(companion, timing.companion_us, EPOCH + phase, fleet.clock(k, EPOCH)))
         for k in fleet.with_backup:
@@ -241,8 +248,15 @@ class Vehicles:
 class _Computers:
     """The companions' computers in lock-step."""
 
-    def __init__(self, loop: LockStep, network: NetworkPart, companions: Mapping[int, Companion]) -> None:
+    def __init__(
+        self,
+        loop: LockStep,
+        network: NetworkPart,
+        companions: Mapping[int, Companion],
+        ending: Mapping[int, EndingCompanion],
+    ) -> None:
         self._loop, self._network, self._companions = loop, network, companions
+        self._ending = ending
 
     def freeze(self, system: int) -> None:
         self._loop.freeze(names.companion(system))
@@ -251,7 +265,11 @@ class _Computers:
         self._loop.thaw(names.companion(system))
 
     def vanish(self, system: int) -> None:
-        self._loop.vanish(names.companion(system))
+        if system in self._ending:
+            self._loop.thaw(names.companion(system))
+            self._ending[system].end()
+        else:
+            self._loop.vanish(names.companion(system))
 
     def step_clock(self, system: int, by: int) -> None:
         if system in self._companions:
