@@ -118,7 +118,7 @@ class CertifiedAvoidance:
             flight.commitment.turn(now)
         elif not self._pilot.guided:
             flight.stand(now, situation.measured.position)
-        elif not situation.stale:
+        if self._pilot.guided and not situation.stale:
             flight.watch(now, situation.measured)
         if self._pilot.guided and not self._finishing and flight.due(now):
             self._replan(now, situation)
