@@ -38,8 +38,8 @@ from trials.companion_ports import CompanionPorts
 from trials.companion_process import CompanionProcess
 from trials.station import listener
 
-PATIENCE: Final = 90.0
-"""Wall time after which an expected event is given up (s)."""
+PATIENCE, START_PATIENCE = 90.0, 400.0
+"""Wall times after which an expected event is given up (s): the first start may compile the planner."""
 TURN_S: Final = 20.0
 """Time between two goals (s)."""
 GOES_ON_M: Final = 3.0
@@ -98,7 +98,11 @@ class CertifiedFlight:
     def fly(self) -> None:
         """Fly it. Raises OutriderError if an expected event does not come."""
         systems = self.plan.systems
-        self._until(lambda: all(self._seen(s, "phase", "escort") for s in systems), "the escort of all")
+        self._until(
+            lambda: all(self._seen(s, "phase", "escort") for s in systems),
+            "the escort of all",
+            START_PATIENCE,
+        )
         began = time.monotonic()
         killed, stopped = self.plan.random.sample(list(systems), 2)
         self._at(self.plan.random.uniform(1.0, TURN_S), lambda: self._kill(killed))
@@ -174,8 +178,8 @@ class CertifiedFlight:
             )
             self._grounds[system].send(self._codec.encode(order))
 
-    def _until(self, is_so: Callable[[], bool], what: str) -> None:
-        end = time.monotonic() + PATIENCE
+    def _until(self, is_so: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
+        end = time.monotonic() + patience
         while not is_so():
             if time.monotonic() > end:
                 raise OutriderError(f"it has not come: {what}")
