@@ -8,7 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
+from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.committed import committed, horizon_of
+from companion.avoidance.certified.fingerprint import fingerprint, identity
+from companion.avoidance.certified.negotiation import Geometry
 from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
 from companion.values.components import COMPONENT
@@ -27,6 +30,7 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import Entry, Statement
 from mavlink_bridge.wire.agreements import pack as pack_statement
+from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
 from mavlink_bridge.wire.signing import Signing
@@ -220,8 +224,37 @@ def test_after_a_farewell_it_is_silent() -> None:
 
 def stated(source: Source = COMPANION, *, farewell: bool = False) -> Tunnel:
     """A statement of the companion's agreements."""
-    said = Statement(7, BEGIN, BEGIN, (Entry(12, ((BEGIN, BEGIN),), (BEGIN, BEGIN)),), farewell)
+    said = Statement(
+        fingerprint(CONFIG, FLEET), BEGIN, BEGIN, (Entry(12, ((BEGIN, BEGIN),), (BEGIN, BEGIN)),), farewell
+    )
     return Tunnel(source, 0, 0, AGREEMENTS, pack_statement(said))
+
+
+def test_its_farewell_is_accepted_by_the_others_with_which_there_was_an_agreement() -> None:
+    """Also by one that heard nothing before, seconds after the plan was made."""
+    bench = Bench()
+    bench.run(1.0)
+    assert bench.plans[-1].epoch < bench.now
+    bench.node.step(bench.now, [bench.tell("swarm", stated())])
+    bench.speaks = False
+    bench.run(9.0)
+    own = plan_from(BEGIN, seed=2)
+    for system, since, accepted in ((12, BEGIN, True), (12, BEGIN + 1_000_000, False), (13, BEGIN, False)):
+        certified, known = CONFIG.certified, identity(CONFIG, FLEET)
+        agreements = Agreements(system, certified, STEPS, known, Geometry(lambda *_: True, lambda *_: True))
+        agreements.begin(since)
+        agreements.made(own._replace(epoch=since))
+        for message in bench.node.farewell(bench.now):
+            assert isinstance(message, Tunnel)
+            if message.payload_type == PAYLOAD_TYPE:
+                agreements.receive_plan(bench.now, SYSTEM, message.payload)
+            else:
+                agreements.receive_statement(bench.now, SYSTEM, unpack_statement(message.payload))
+        # The second has begun anew since, and the third has never agreed: this farewell may be an old one.
+        assert (SYSTEM in agreements.left) is accepted
+        if accepted:
+            end = horizon_of(bench.plans[-1]).at(bench.now).position
+            assert np.allclose(agreements.left[SYSTEM].controls[-1, 2], end, atol=1e-9)
 
 
 def test_statements_without_a_farewell_and_those_of_others_change_nothing() -> None:

@@ -7,6 +7,9 @@ from typing import Any
 
 import pytest
 
+from companion.avoidance.certified.agreements import Agreements
+from companion.node import Companion
+from companion.planning.certified import CertifiedAvoidance
 from tests.scenarios.lockstep_flights import fly, scenario
 
 SWAP: dict[str, Any] = {
@@ -17,6 +20,12 @@ SWAP: dict[str, Any] = {
     "companion": {"avoidance": "certified", "turning_sense": "right"},
 }
 """At 1.5 s all are under way at 4 m/s or so."""
+
+
+def agreements(companion: Companion) -> Agreements:
+    avoidance = companion.avoidance
+    assert isinstance(avoidance, CertifiedAvoidance)
+    return avoidance._flight.agreements
 
 
 @pytest.mark.parametrize(
@@ -41,7 +50,12 @@ def test_a_plan_is_kept_whose_companion_is_silent(
     separation = flown.summary["min_separation_m"]
     assert isinstance(separation, float)
     assert separation > 1.0
-    assert flown.summary["converged"] is (fault["kind"] == "freeze")
+    ended = fault["kind"] == "vanish"
+    assert flown.summary["converged"] is not ended
+    # The others hear that the plan is the last, and fly past its end to their goals.
+    others = [c for c in flight.companions if c.name != "companion-12"]
+    assert [12 in agreements(c).left for c in others] == [ended] * 2
+    assert flown.summary["others_converge_s"] is not None
 
 
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
