@@ -97,9 +97,9 @@ class Peer:
         """
         known = self.pair.kept, self.pair.considered
         if self.left is None and self._seen.get(statement) == known:
-            # A repeated statement changes nothing.
+            # A repeated statement changes no agreement.
             self.last_received = now
-            return False
+            return self._receive_head(statement)
         changed = self._receive_head(statement)
         if statement.away:
             self.last_received = now

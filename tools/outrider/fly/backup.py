@@ -20,6 +20,8 @@ from outrider.runs.names import BACKUP_LOGS
 
 HUNG_S: Final = 5.0
 """Time without a report after which the backup process counts as hung (s)."""
+_START_PERIOD_S: Final = 1.0
+"""Least time between two starts of the process (s)."""
 _END_TIMEOUT_S: Final = 12.0
 """Time limit for the end of a plan, its settling and the hold request (s)."""
 _LOOK_S: Final = 0.05
@@ -63,6 +65,7 @@ class Backup:
         self.carried = 0
         """Number of set-points that backup processes have sent, as last reported."""
         self._carried_before = 0
+        self._next_start = 0.0
 
     def start(self) -> None:
         """Start the process."""
@@ -78,8 +81,10 @@ class Backup:
             self.copies,
             self._directory / BACKUP_LOGS.format(self._number),
         )
-        process = self._process = ChildProcess(worker)
+        process = ChildProcess(worker)
+        self._next_start = time.monotonic() + _START_PERIOD_S
         self._tell("process", f"the backup node runs in process {process.start()}")
+        self._process = process
         self._orders.release()
         self._watchdog = Watchdog(time.monotonic(), HUNG_S)
 
@@ -88,15 +93,18 @@ class Backup:
         self.copies.close()
 
     def look(self) -> None:
-        """Read its reports, and start it again if it is lost."""
+        """Read its reports, and start it again if it is lost, at most once a second."""
         self._receive()
         hung = self._watchdog.stopped(time.monotonic())
-        if self._process is None or (self._process.status is None and not hung):
-            return
-        self._tell("concern", "the backup node is lost: it hangs" if hung else "the backup node is lost")
-        self._discard()
-        self._carried_before = self.carried
-        self.start()
+        if self._process is not None and (hung or self._process.status is not None):
+            self._tell("concern", "the backup node is lost: it hangs" if hung else "the backup node is lost")
+            self._discard()
+            self._carried_before = self.carried
+        if self._process is None and time.monotonic() >= self._next_start:
+            try:
+                self.start()
+            except OSError as error:
+                self._tell("concern", f"the backup node cannot be started: {error}")
 
     def relieve(self, look: Callable[[], None]) -> End | None:
         """Let it fly the plan to its end and request the hold, as the companion is gone; ``look`` meanwhile.
@@ -113,6 +121,9 @@ class Backup:
             look()
         self._receive()
         over = self._over
+        if over is None:
+            # Nothing else may send to the autopilot beside the hold request that follows.
+            self._discard()
         return over if over is not None and over.said else None
 
     def close(self) -> None:
@@ -130,6 +141,7 @@ class Backup:
         self._process.join()
         self._receive()
         self._desk.close()
+        self._process = None
 
     def _receive(self) -> None:
         for news in self._desk.news():

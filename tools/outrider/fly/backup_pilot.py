@@ -88,6 +88,8 @@ class BackupPilot:
         self._swarm = Codec(None, signing, COMPANION_LINKS.index("swarm"))
         self._next_farewell = 0
         self._beat: Heartbeat | None = None
+        self._beat_at = 0
+        self._gone_since: int | None = None
         self._heard: int | None = None
         self.deaf = False
         """Whether the companion copies nothing, so that the autopilot's link is to be read here."""
@@ -125,7 +127,7 @@ class BackupPilot:
         self._backup.receive(now, messages)
         for message in messages:
             if isinstance(message, Heartbeat):
-                self._beat = message
+                self._beat, self._beat_at = message, now
 
     def _copied(self, copies: Copies) -> list[Message]:
         if self._signing is not None:
@@ -151,7 +153,9 @@ class BackupPilot:
             if not self._backup.steers:
                 self.over = True
                 return []
-            if not self._backup.rests(now, SETTLING_US):
+            self._gone_since = now if self._gone_since is None else self._gone_since
+            # A heartbeat of before may be older than the change of mode by a pilot.
+            if not self._backup.rests(now, SETTLING_US) or self._beat_at < self._gone_since:
                 return []
             signing = None
             if self._key is not None and self._signing is not None:
