@@ -229,6 +229,18 @@ def test_a_vehicle_that_a_pilot_takes_is_left_alone() -> None:
     assert rig.mode == mavlink.COPTER_MODE_LOITER
 
 
+def test_a_vehicle_that_a_pilot_took_since_the_last_heartbeat_is_left_alone() -> None:
+    """Its plan is at rest already when the companion ends, but the mode that was heard is of before."""
+    rig = Rig()
+    rig.run(6.5)
+    rig.copies, rig.pilot.gone = False, True
+    rig.mode = mavlink.COPTER_MODE_LOITER
+    rig.run(3.0)
+    assert rig.pilot.over
+    assert orders(rig) == []
+    assert rig.mode == mavlink.COPTER_MODE_LOITER
+
+
 def test_without_a_flown_plan_there_is_nothing_to_do() -> None:
     rig = Rig()
     rig.copies, rig.pilot.gone = False, True

@@ -7,6 +7,7 @@ import pytest
 
 from companion.avoidance.certified.committed import controls
 from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.qp import Objective
 from companion.avoidance.certified.separating_planes import Others
 from companion.avoidance.field.planner import standing
@@ -14,7 +15,7 @@ from companion.config import CompanionConfig
 from companion.values.horizon import Array, Motion
 from companion.world import View, World
 from mavlink_bridge.messages import Message, Source, Tunnel
-from mavlink_bridge.wire.agreements import PAYLOAD_TYPE, unpack
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE, Statement, unpack
 from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.swarm import FLEET
 from tests.companion.avoidance.certified.test_commitment import HERE, LENGTH, STEPS, Subgoal, commitment
@@ -98,3 +99,11 @@ def test_who_leaves_its_tube_states_by_how_much_until_it_is_back() -> None:
     pair.run(2_000_000, 3_000_000, inside)
     assert pair.stated == {1: 0.0, 2: 0.0}
     assert pair.flights[2].agreements.outside == 0.0
+
+
+def test_a_statement_that_comes_again_counts_again() -> None:
+    """Out of the tube, back, and out by as much: within one epoch the third statement equals the first."""
+    peer = Peer(1, 2)
+    for outside in (0.3, 0.0, 0.3):
+        peer.receive(EPOCH, Statement(7, EPOCH, EPOCH, outside=outside), 0)
+        assert peer.outside == outside
