@@ -15,6 +15,7 @@ from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import CommandLong, GpsGlobalOrigin, Heartbeat, LocalPosition
 from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.signing import Signing
 from trials.observer import OWN
 from trials.separation import Track
 
@@ -33,9 +34,15 @@ _MESSAGES: Final = frozenset(
 
 
 class Arrivals:
-    """Positions of ``systems`` as they arrive on ``link``; ``fleet``: the frame of all positions."""
+    """Positions of ``systems`` as they arrive on ``link``; ``fleet``: the frame of all positions.
 
-    def __init__(self, link: Link, systems: Sequence[int], fleet: FleetFrame) -> None:
+    ``signing``: for the requests; what arrives is not checked.
+    """
+
+    def __init__(
+        self, link: Link, systems: Sequence[int], fleet: FleetFrame, signing: Signing | None = None
+    ) -> None:
+        self._requests = Codec(None, signing)
         self._link, self._fleet = link, fleet
         self._codec = Codec(
             lambda identifier, system, component: (
@@ -71,7 +78,7 @@ class Arrivals:
         for system in (system for system, frame in self._frames.items() if frame is None):
             whom = system, mavlink.MAV_COMP_ID_AUTOPILOT1
             request = CommandLong(OWN, *whom, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, params)
-            self._link.send(self._codec.encode(request))
+            self._link.send(self._requests.encode(request))
 
     def place(self, system: int) -> Array | None:
         """Return the last position (3,) m of ``system``; None before the first."""

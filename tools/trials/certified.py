@@ -23,12 +23,15 @@ import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.values.components import COMPONENT
+from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandInt, Source
 from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.signing import Signing
 from outrider.certify.reading import read
 from outrider.certify.verdict import judge
 from outrider.errors import OutriderError
+from outrider.key_files import key_of, new_key
 from outrider.runs.directories import new_directory
 from outrider.terminal.lines import say
 from trials.arrivals import Arrivals
@@ -56,7 +59,15 @@ class CertifiedFlight:
         self.plan, self.directory = plan, directory
         origin = plan.origin
         self._frame = FleetFrame(origin["latitude"], origin["longitude"], origin["altitude"])
-        self._codec = Codec()
+        key = directory / "fleet.key"
+        self._signing: Signing | None = None
+        options: list[str] = []
+        if plan.signed:
+            new_key(key)
+            self._signing = Signing(key_of(key))
+            self._signing.present(WallClock().now())
+            options = [f"--signing-key={key}"]
+        self._codec = Codec(None, self._signing)
         self.acts: list[str] = []
         self.reached: dict[int, int] = dict.fromkeys(plan.systems, 0)
         """Number of goals that each vehicle has reached."""
@@ -71,9 +82,9 @@ class CertifiedFlight:
         with ExitStack() as files:
             receiver, told = listener()
             files.callback(receiver.close)
-            self._vehicles = CertifiedVehicles(plan, told, directory)
+            self._vehicles = CertifiedVehicles(plan, told, directory, options)
             files.callback(self._vehicles.close)
-            self.arrivals = Arrivals(receiver, plan.systems, self._frame)
+            self.arrivals = Arrivals(receiver, plan.systems, self._frame, self._signing)
             self._swarm = CompanionPorts(plan.systems, plan.loss, plan.random)
             files.callback(self._swarm.close)
             self._grounds = {}
@@ -89,6 +100,7 @@ class CertifiedFlight:
                     f"--ground={endpoint}",
                     f"--config={configs[system]}",
                     "--go",
+                    *options,
                 ]
                 companion = CompanionProcess(system, directory / f"vehicle-{system}", *words)
                 files.callback(companion.close)
@@ -158,6 +170,8 @@ class CertifiedFlight:
 
     def _send_goals(self) -> None:
         """Send each vehicle its goal again and again; note who has arrived."""
+        if self._signing is not None:
+            self._signing.present(WallClock().now())
         again = time.monotonic() >= self._next_goals
         if again:
             self._next_goals = time.monotonic() + 1.0
@@ -253,13 +267,16 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--flights", type=int, default=1)
     parser.add_argument("--seed", type=int, default=1, help="of the first flight; the next has the next one")
     parser.add_argument("--loss", type=float, default=0.2, help="share of the swarm's messages that is lost")
+    parser.add_argument("--signed", action="store_true", help="sign all links")
     parser.add_argument("--victims", nargs="+", choices=PROCESSES, default=list(PROCESSES))
     parser.add_argument("--out", type=Path, help="a new directory for all files")
     asked = parser.parse_args(words)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     directory = new_directory(asked.out, f"trial-certified-{asked.kind}")
     failed = 0
     for seed in range(asked.seed, asked.seed + asked.flights):
-        plan = CertifiedPlan(asked.kind, asked.count, seed, asked.loss, victims=tuple(asked.victims))
+        victims = tuple(asked.victims)
+        plan = CertifiedPlan(asked.kind, asked.count, seed, asked.loss, victims=victims, signed=asked.signed)
         place = directory / f"seed-{seed}"
         place.mkdir()
         found = flown(plan, place)

@@ -41,6 +41,8 @@ class CertifiedPlan:
     seconds: float = 45.0
     """Time from the first goals to the end (s)."""
     d_min: float = 0.5
+    signed: bool = False
+    """Whether all links are signed with one key."""
     random: Random = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -6,6 +6,7 @@ import json
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,7 +25,8 @@ class CertifiedVehicles:
     OutriderError if one does not start.
     """
 
-    def __init__(self, plan: CertifiedPlan, receiver: str, directory: Path) -> None:
+    def __init__(self, plan: CertifiedPlan, receiver: str, directory: Path, signing: Sequence[str]) -> None:
+        """Take ``signing``: the options for signed links."""
         origin = plan.origin
         frame = FleetFrame(origin["latitude"], origin["longitude"], origin["altitude"])
         self._processes: list[subprocess.Popen[bytes]] = []
@@ -34,7 +36,11 @@ class CertifiedVehicles:
             latitude, longitude, altitude = frame.to_geodetic((SPACING * (system - 1), 0.0, 0.0))
             command = [sys.executable, "-m", "outrider", "sitl", "--json", f"--flavour={flavour}"]
             command += [f"--first-id={system}", f"--port-base={free_base(flavour, 1)}", f"--to={receiver}"]
-            command += [f"--origin={latitude:.9f},{longitude:.9f},{altitude:.3f}", "--response=firmware"]
+            command += [
+                f"--origin={latitude:.9f},{longitude:.9f},{altitude:.3f}",
+                "--response=firmware",
+                *signing,
+            ]
             with (directory / f"sitl-{system}.log").open("wb") as err:
                 process = subprocess.Popen(
                     command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=err
