@@ -217,23 +217,18 @@ class HealthMonitor:
         return Concern(f"near {s.nearest[0]}", f"Neighbour {s.nearest[0]} is near: slower")
 
     def _refused(self, s: HealthInputs) -> list[Concern]:
-        doubled = [
-            Concern(f"doubled {system}", f"Two vehicles have id {system}: no new plans")
-            for system in s.refused.doubled
+        refused = s.refused
+        kinds = (
+            ("doubled", "Two vehicles have id {}: no new plans", refused.doubled),
+            ("foreign", "Plans of {} are in another frame", refused.foreign),
+            ("differing", "{} has another fleet file or settings", refused.differing),
+            ("peer clock", "Clock of {} is wrong: no new plans", refused.wrong_clock),
+        )
+        return [
+            Concern(f"{kind} {system}", text.format(system))
+            for kind, text, systems in kinds
+            for system in systems
         ]
-        foreign = [
-            Concern(f"foreign {system}", f"Plans of {system} are in another frame")
-            for system in s.refused.foreign
-        ]
-        differing = [
-            Concern(f"differing {system}", f"{system} has another fleet file or settings")
-            for system in s.refused.differing
-        ]
-        clocks = [
-            Concern(f"peer clock {system}", f"Clock of {system} is wrong: no new plans")
-            for system in s.refused.wrong_clock
-        ]
-        return doubled + foreign + differing + clocks
 
     def _fence(self, s: HealthInputs) -> Concern | None:
         guard, own = self._config.guard, s.view.own

@@ -176,9 +176,8 @@ class Goals:
         turn, apart = self._turn(here, neighbours - target.position)
         first = surface.nearest(turned(here, turn) if turn else here)
 
-        def path(seconds: Array) -> Path:
-            """Return the destination and its velocity after ``seconds`` (n,)."""
-            positions, velocities = target.ahead(seconds)
+        def around(positions: Array, velocities: Array, seconds: Array) -> Path:
+            """Return the destination, where the target is at ``positions`` (n, 3) after ``seconds`` (n,)."""
             offsets = np.broadcast_to(first, positions.shape)
             if rate:
                 offsets = surface.nearest(np.array([turned(first, rate * after) for after in seconds]))
@@ -188,9 +187,15 @@ class Goals:
                 offsets = np.array([outside(offset, turn) for offset in offsets])
             return Path(positions + offsets, velocities)
 
-        (destination,), (velocity,) = path(np.array([ahead]))
-        (end,), _ = target.ahead(np.array([ahead]))
-        return Aim(destination, velocity, target.position, end, surface, apart, path)
+        last = np.array([ahead])
+        ends = target.ahead(last)
+        (destination,), (velocity,) = around(*ends, last)
+
+        def path(seconds: Array) -> Path:
+            """Return the destination and its velocity after ``seconds`` (n,)."""
+            return around(*target.ahead(seconds), seconds)
+
+        return Aim(destination, velocity, target.position, ends.positions[0], surface, apart, path)
 
     def _turn(self, offset: Array, neighbours: Array) -> tuple[float, float]:
         """Return the angle (rad) by which to go round, and the spacing.

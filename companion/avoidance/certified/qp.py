@@ -103,7 +103,7 @@ class SeparationQp:
         self, steps: int, limits: LimitsConfig, config: CertifiedConfig, *, planar: bool = False
     ) -> None:
         n, dt = steps, config.dt_us * 1e-6
-        self.n, self._config = n, config
+        self.n = n
         S_v, self._S_x, _ = prediction(n, dt)
         self.dt, self.S_v = dt, np.ascontiguousarray(S_v)
         v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self.S_v, self._S_x))

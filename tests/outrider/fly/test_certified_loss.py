@@ -4,23 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from mavlink_bridge.clocks.clock import SimulatedClock
-from mavlink_bridge.links.endpoints import parse_endpoint
 from outrider.fly import flight
 from outrider.fly.backup import End
-from outrider.fly.event_log import EventLog
-from outrider.fly.flight import MOST, Flight
-from outrider.fly.line_input import LineInput
-from outrider.fly.request import Request
-from outrider.fly.wiring import wire
+from outrider.fly.flight import MOST
 from outrider.fly.worker import Worker
 from outrider.scenarios.fly_config import FlyConfig
+from tests.outrider.fly.supervised import flown
 from tests.outrider.fly.test_certified_request import BASE, MEASURED
 
 CONFIG = FlyConfig.model_validate(
@@ -83,22 +77,13 @@ def test_each_loss_is_followed_by_the_backup_nodes_hold_and_then_the_next_compan
     def asked(*_given: object) -> None:
         done.append("asked")
 
-    monkeypatch.setattr(flight, "ChildProcess", Lost)
     monkeypatch.setattr(flight, "Backup", Backup)
     monkeypatch.setattr(flight, "farewell", asked)
-    monkeypatch.setattr(Flight, "_identify", lambda _flight: True)
-    endpoint = parse_endpoint("udpin:127.0.0.1:0")
-    ends = dict.fromkeys(("autopilot", "swarm", "target", "ground"), endpoint)
-    wiring = wire(ends, 1, 100, CONFIG.settings, SimulatedClock(1))
-    with closing(wiring), closing(EventLog(tmp_path, lambda: 0.0)) as event_log:
-        flown = Flight(
-            Request(CONFIG, "own", ends), wiring, tmp_path, event_log, LineInput(None), [], lambda: None
-        )
-        flown.run()
+    over = flown(CONFIG, "own", Lost, tmp_path, monkeypatch)
     os.close(near)
     os.close(far)
     one = ["backup", "companion", "relieved", *(["asked"] if end is None else [])]
     assert done == one * MOST
-    assert flown.carried == 7 * MOST
+    assert over.carried == 7 * MOST
     if end is not None:
-        assert flown.last_word == end.said
+        assert over.last_word == end.said

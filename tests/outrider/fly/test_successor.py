@@ -5,30 +5,25 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.clocks.followed_clock import FollowedClock
-from mavlink_bridge.links.endpoints import parse_endpoint
 from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, LocalPosition, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
-from outrider.fly import flight
-from outrider.fly.event_log import EventLog
-from outrider.fly.flight import MOST, Flight
-from outrider.fly.line_input import LineInput
+from outrider.fly.flight import MOST
 from outrider.fly.process_channel import OrderLink, intercom
 from outrider.fly.request import Request
 from outrider.fly.status import StatusReports
 from outrider.fly.transmit_statistics import TransmitStatistics
-from outrider.fly.wiring import wire
 from outrider.fly.worker import Worker
 from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
 from outrider.supervision.duplicate_ids import DuplicateIds
 from outrider.supervision.supervised_node import SupervisedNode
+from tests.outrider.fly.supervised import flown
 
 ORIGIN = (47.4, 8.5, 488.0)
 CONFIG = FlyConfig(system=1, target=100, origin=FleetOrigin(latitude=47.4, longitude=8.5, altitude=488.0))
@@ -111,19 +106,10 @@ def test_what_one_process_found_out_all_after_it_know(
         def join(self) -> None:
             """It is gone."""
 
-    monkeypatch.setattr(flight, "ChildProcess", Lost)
-    monkeypatch.setattr(Flight, "_identify", lambda _flight: True)
-    endpoint = parse_endpoint("udpin:127.0.0.1:0")
-    ends = dict.fromkeys(("autopilot", "swarm", "target", "ground"), endpoint)
-    wiring = wire(ends, 1, 100, CONFIG.settings, SimulatedClock(1))
-    with closing(wiring), closing(EventLog(tmp_path, lambda: 0.0)) as event_log:
-        flown = Flight(
-            Request(CONFIG, "px4", ends), wiring, tmp_path, event_log, LineInput(None), [], lambda: None
-        )
-        flown.run()
+    over = flown(CONFIG, "px4", Lost, tmp_path, monkeypatch)
     os.close(near)
     os.close(far)
-    assert flown.fault
+    assert over.fault
     assert known == [None, None, *[found] * (MOST - 2)]
     # What it said of its end was heard, too.
-    assert [why for _, why in flown.restarts] == [f"trouble {k + 1}" for k in range(MOST)]
+    assert [why for _, why in over.restarts] == [f"trouble {k + 1}" for k in range(MOST)]
