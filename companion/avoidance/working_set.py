@@ -290,7 +290,11 @@ def working_sets(
                         continue
                 if held == n:
                     break
-                rows[i, held], sides[i, held] = abs(worst) - 1, 1 if worst > 0 else -1
+                row = abs(worst) - 1
+                if held == size:
+                    # No variable is free to keep one row more: the last one of those that the row depends on.
+                    side[row % n] = 0
+                rows[i, held], sides[i, held] = row, 1 if worst > 0 else -1
                 held += 1
         if not settled:
             continue

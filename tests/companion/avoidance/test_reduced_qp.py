@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import daqp
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from companion.avoidance import reduced_qp
@@ -90,6 +90,7 @@ def test_most_qps_need_no_more_than_their_working_set() -> None:
 
 @LAWS
 @given(st.floats(0.0, 0.999), st.floats(30.0, 300.0), st.sampled_from([-1.0, 1.0]))
+@example(0.75, 57.0, -1.0)  # The last variable reaches its bound before the last row binds.
 def test_a_vehicle_on_its_way_to_a_distant_goal_accelerates_to_its_top_speed(
     share: float, distance: float, sign: float
 ) -> None:
