@@ -108,7 +108,7 @@ class BackupNode:
         finishes: bool = False,
     ) -> None:
         self._finishes = finishes
-        self.name = f"helm-{system}"
+        self.name = f"backup-{system}"
         self._config, self._fleet = config, fleet
         self._own = Source(system, BACKUP)
         self._codecs = {link: Codec(accepts(link, system), signing) for link in LINKS}

@@ -42,7 +42,7 @@ def test_a_plan_is_kept_whose_companion_is_silent(
     flown = fly(of, 1, tmp_path)
     flight = flown.flight
     silent = flight.backup_nodes[1]
-    # Only the helm of the one that was silent had anything to do.
+    # Only the backup node of the one that was silent had anything to do.
     assert silent.carried > 40
     assert [backup_node.carried for backup_node in flight.backup_nodes if backup_node is not silent] == [0, 0]
     assert flown.summary["d_min_violations"] == 0

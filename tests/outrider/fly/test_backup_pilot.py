@@ -55,6 +55,7 @@ class Rig:
         self.pilot = BackupPilot(SYSTEM, backup, signing, key)
         self.now, self.plan = BEGIN, plan_from(BEGIN)
         self.copies = self.hears = True
+        self.holds = False
         self.mode: int = mavlink.COPTER_MODE_GUIDED
         self.sent: list[tuple[int, Message]] = []
         self._trusted = Codec()
@@ -86,9 +87,11 @@ class Rig:
                 vehicle += self._trusted.encode(GpsGlobalOrigin(AUTOPILOT, *place, 0))
             if since % SECOND == 0:
                 vehicle += self._trusted.encode(beat)
-            autopilot = self._trusted.encode(self._setpoint()) if since % 20_000 == 0 else b""
+            steers = since % 20_000 == 0 and not self.holds
+            autopilot = self._trusted.encode(self._setpoint()) if steers else b""
             swarm = self._trusted.encode(Tunnel(COMPANION, 0, 0, PLAN, pack(self.plan)))
-            inbox.append(Datagram("copies", Copies(self.now, 0, vehicle, autopilot, swarm).pack()))
+            copies = Copies(self.now, 0, vehicle, autopilot, swarm, holds=self.holds)
+            inbox.append(Datagram("copies", copies.pack()))
         elif self.pilot.deaf and self.hears and since % SECOND == 0:
             inbox.append(Datagram("autopilot", self._vehicle.encode(beat)))
         return inbox
@@ -106,6 +109,18 @@ KEY: Final = Key.of_passphrase("correct horse")
 def orders(rig: Rig) -> list[int]:
     """Times of the requests for another mode."""
     return [at for at, message in rig.heard(CommandLong)]
+
+
+def test_it_sends_nothing_beside_the_request_for_the_hold_of_the_companion() -> None:
+    rig = Rig()
+    rig.run(1.0)
+    rig.holds = True
+    rig.run(2.0)
+    assert rig.heard(SetpointLocal) == orders(rig) == []
+    rig.copies, rig.pilot.gone = False, True
+    rig.run(8.0)
+    assert orders(rig)
+    assert rig.mode == HELD
 
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["unsigned", "signed"])

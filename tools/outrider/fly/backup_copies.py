@@ -12,9 +12,9 @@ from struct import Struct
 from struct import error as StructError  # noqa: N812
 from typing import Final, NamedTuple
 
-from mavlink_bridge.links.link import BURST, LinkCounters
+from mavlink_bridge.links.link import LinkCounters
 
-_HEADER: Final = Struct("<QQHHHH")
+_HEADER: Final = Struct("<QQ?HHHH")
 _MAX_RECORD_BYTES: Final = 65536
 _BUFFER_BYTES: Final = 1 << 20
 
@@ -24,7 +24,8 @@ class Copies(NamedTuple):
 
     ``stamp``: the companion's newest signing stamp (10 µs since 2015). ``vehicle``: frames of the autopilot,
     without signatures. ``autopilot``, ``swarm``: frames that the companion sends on these links. ``heard``:
-    what arrived on the swarm link, as it is, only for the log.
+    what arrived on the swarm link, as it is, only for the log. ``holds``: the companion flies no more and
+    requests the hold itself.
     """
 
     time: int = 0
@@ -33,24 +34,25 @@ class Copies(NamedTuple):
     autopilot: bytes = b""
     swarm: bytes = b""
     heard: bytes = b""
+    holds: bool = False
 
     def pack(self) -> bytes:
         """Return the record as bytes. Raises ValueError for a part that is too long."""
         parts = self.vehicle, self.autopilot, self.swarm, self.heard
         try:
-            return _HEADER.pack(self.time, self.stamp, *map(len, parts)) + b"".join(parts)
+            return _HEADER.pack(self.time, self.stamp, self.holds, *map(len, parts)) + b"".join(parts)
         except StructError as error:
             raise ValueError(f"a record does not fit: {error}") from None
 
 
 def unpack(data: bytes) -> Copies:
     """Return the record of ``data``, as ``Copies.pack`` has made it."""
-    time, stamp, *sizes = _HEADER.unpack_from(data)
+    time, stamp, holds, *sizes = _HEADER.unpack_from(data)
     parts, at = [], _HEADER.size
     for size in sizes:
         parts.append(data[at : at + size])
         at += size
-    return Copies(time, stamp, *parts)
+    return Copies(time, stamp, *parts, holds=holds)
 
 
 def copies_pair() -> tuple[CopySender, CopyLink]:
@@ -103,9 +105,12 @@ class CopyLink:
         """Return None: the link is read in each step."""
 
     def receive(self) -> list[bytes]:
-        """Return the records that have arrived."""
+        """Return all records that have arrived; the socket's buffer bounds their number.
+
+        With a part of them the companion would count as silent.
+        """
         found: list[bytes] = []
-        while len(found) < BURST and not self.ended:
+        while not self.ended:
             try:
                 data = self._end.recv(_MAX_RECORD_BYTES)
             except BlockingIOError:

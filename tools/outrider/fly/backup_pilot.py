@@ -91,6 +91,7 @@ class BackupPilot:
         self._beat_at = 0
         self._gone_since: int | None = None
         self._heard: int | None = None
+        self._holds = False
         self.deaf = False
         """Whether the companion copies nothing, so that the autopilot's link is to be read here."""
 
@@ -107,11 +108,15 @@ class BackupPilot:
             if link == _COPIES:
                 self._heard = now
                 copies = unpack(data)
+                self._holds = copies.holds
                 self._receive(copies.time, self._copied(copies))
             elif link == "autopilot":
                 self._receive(now, self._read.feed(data))
         self._heard = now if self._heard is None else self._heard
         self.deaf = self.gone or now - self._heard > DEAF_US
+        if self._holds and not self.deaf:
+            # Set-points beside the request for the hold could be taken for a return to the flight.
+            return []
         leaving = self._backup.advance(now)
         if self.gone and not self.over:
             leaving += self._farewell(now)

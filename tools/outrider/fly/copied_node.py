@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from companion.backup_node import LINKS
@@ -21,14 +21,20 @@ class CopiedNode:
     """``Node`` that steps ``inner`` and sends ``copies`` of each step of its ``companion``.
 
     The autopilot's heartbeat and origin are copied as the companion has accepted them, so that forged ones do
-    not reach the backup node. ``signing``: the companion's.
+    not reach the backup node. ``signing``: the companion's. ``holds`` returns whether ``inner`` has replaced
+    the companion by the request for the hold.
     """
 
     def __init__(
-        self, inner: Node, companion: Companion, copies: CopySender, signing: Signing | None = None
+        self,
+        inner: Node,
+        companion: Companion,
+        copies: CopySender,
+        signing: Signing | None = None,
+        holds: Callable[[], bool] = lambda: False,
     ) -> None:
         self._inner, self._companion = inner, companion
-        self._copies, self._signing = copies, signing
+        self._copies, self._signing, self._holds = copies, signing, holds
         self._codec = Codec()
         self._beat: Heartbeat | None = None
         self._origin: tuple[float, float, float] | None = None
@@ -49,7 +55,8 @@ class CopiedNode:
         vehicle = b"".join(self._codec.encode(message) for message in self._heard(now))
         stamp = 0 if self._signing is None else self._signing.newest
         heard = b"".join(datagram.data for datagram in inbox if datagram.link == "swarm")
-        self._copies.send(Copies(now, stamp, vehicle, sent["autopilot"], sent["swarm"], heard))
+        record = Copies(now, stamp, vehicle, sent["autopilot"], sent["swarm"], heard, self._holds())
+        self._copies.send(record)
         return leaving
 
     def _heard(self, now: int) -> list[Message]:

@@ -160,7 +160,9 @@ class Worker:
 
             flying: Node = supervised
             if self._copies is not None:
-                flying = CopiedNode(supervised, node, self._copies, self._signing)
+                flying = CopiedNode(
+                    supervised, node, self._copies, self._signing, lambda: supervised.last is not None
+                )
             loop = RealTime(
                 Scheduled(flying, asked.config.period_us),
                 links,

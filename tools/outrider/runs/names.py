@@ -15,7 +15,7 @@ def companion(system: int) -> str:
 
 def backup_node(system: int) -> str:
     """Return the name of the backup node, which continues the plan when the companion is silent."""
-    return f"helm-{system}"
+    return f"backup-{system}"
 
 
 def autopilot(system: int) -> str:

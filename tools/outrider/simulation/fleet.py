@@ -215,7 +215,7 @@ class Fleet:
             if k in self.with_backup:
                 # Companion and backup node run on the same computer: what they send each other is not lost.
                 channels.append(
-                    Channel(f"helm-{name}", {name: "swarm", names.backup_node(system): "swarm"}, Faults())
+                    Channel(f"backup-{name}", {name: "swarm", names.backup_node(system): "swarm"}, Faults())
                 )
         swarm = [End(name, "swarm", words) for name, words in companions]
         swarm += [End(names.moving(s), "swarm", ("moving", s)) for s in self.scenario.moving_systems]
