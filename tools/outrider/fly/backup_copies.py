@@ -52,7 +52,8 @@ def unpack(data: bytes) -> Copies:
     for size in sizes:
         parts.append(data[at : at + size])
         at += size
-    return Copies(time, stamp, *parts, holds=holds)
+    vehicle, autopilot, swarm, heard = parts
+    return Copies(time, stamp, vehicle, autopilot, swarm, heard, holds)
 
 
 def copies_pair() -> tuple[CopySender, CopyLink]:
