@@ -19,6 +19,9 @@ from companion.values.horizon import Array
 from companion.world import World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
+from mavlink_bridge.wire.agreements import Entry, Statement
+from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
 from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
@@ -88,7 +91,26 @@ def _scene(config: CompanionConfig, seed: int, epoch: int) -> Scene:
         plan = _braking(config, epoch, place, speed, fleet.fingerprint)
         flight.receive(epoch, Tunnel(Source(20 + k, COMPONENT), 0, 0, PAYLOAD_TYPE, pack(plan)))
     own = _braking(config, epoch, here, course, fleet.fingerprint)
+    _agree(flight, own)
     return Scene(flight, world, own, standing(here + 8.0 * course, np.array([2.0, 2.0, 0.0])))
+
+
+def _agree(flight: CertifiedFlight, own: WirePlan) -> None:
+    """Make the neighbours' agreements on the newest plans, so that the plan keeps planes from all of them.
+
+    Raises RuntimeError if one is refused.
+    """
+    agreements, epoch = flight.agreements, own.epoch
+    agreements.begin(epoch)
+    agreements.made(own)
+    stated = pack_statement(
+        Statement(agreements.fingerprint, epoch, epoch, (Entry(1, ((epoch, epoch),), (epoch, epoch)),))
+    )
+    for k in range(_NEIGHBOURS):
+        flight.receive(epoch, Tunnel(Source(20 + k, COMPONENT), 0, 0, AGREEMENTS, stated))
+    agreements.update(epoch)
+    if agreements.missing() or len(agreements.agreed()) != _NEIGHBOURS:
+        raise RuntimeError("the benchmark's scene lacks an agreement")
 
 
 def _braking(config: CompanionConfig, epoch: int, place: Array, speed: Array, origin: int) -> WirePlan:
