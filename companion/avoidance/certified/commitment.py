@@ -150,12 +150,11 @@ class Commitment:
             # The rounded plan is checked, because the others receive the rounded one.
             kept = along(corridor.normals, points) - corridor.least
             if kept.min(initial=np.inf) >= 0.0:
-                push = np.einsum("mni,mnk->k", answer.plane_multipliers, corridor.normals)
                 moving = objective.moving
                 gradient = self._program.costs[moving].gradient_per_metre
                 seconds = 1e-6 * self._config.epoch_us
                 self._deadlock_turn.learn(
-                    points[-1, 2], goal.place, push, gradient, seconds, goal.beyond, moving=moving
+                    points[-1, 2], goal.place, answer.push, gradient, seconds, goal.beyond, moving=moving
                 )
                 self.following = plan
                 return True

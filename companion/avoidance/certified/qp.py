@@ -6,8 +6,9 @@ linear term −2 Ω_f f·x of every step: it moves the positions within the cons
 could not follow a lasting push with its accelerations. The plan ends at rest.
 
 Bounds of acceleration are bounds on variables. Limits of speed and position and the planes are rows Ga ≥ low.
-``active_set`` finds what binds, about ten of seven hundred. PIQP solves the QP with that in its dual form:
-with as many variables as bind, the multipliers. Its solution is checked against all rows and bounds. Where it
+Rows that hold for all accelerations within their bounds are left out (``rows_within``). ``active_set`` finds
+what binds of the others, about ten of seven hundred. PIQP solves the QP with that in its dual form: with as
+many variables as bind, the multipliers. Its solution is checked against all rows and bounds. Where it
 violates one, or no active set is found, PIQP solves in the accelerations, with the rows that matter: those
 within ``_NEAR`` of the committed plan, or violated by the best plan without rows or by an earlier solution.
 A limit that the committed plan violates is relaxed until the plan satisfies it, so that this plan is feasible
@@ -19,14 +20,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from companion.avoidance.certified.cost import arriving, following
-from companion.avoidance.certified.qp_vectors import row_bounds, write_cost, write_start
+from companion.avoidance.certified.cost import Cost, arriving, following
+from companion.avoidance.certified.qp_vectors import write_cost
 from companion.avoidance.certified.rows import (
+    BOUND,
     active_set,
     combine,
-    relax_limits,
     row_slacks,
+    rows_within,
     write_rows,
 )
 from companion.avoidance.certified.separating_planes import Planes
@@ -40,12 +43,10 @@ from companion.values.prediction import prediction
 _ROUNDS = 8
 _NEAR = 0.1
 """Distance (m/s, m) of the committed plan within which a row takes part from the first solution on."""
-_KINDS = 18
+_LIMITS = 18
 """Number of rows of the limits in each step: speed, second and third control point, three axes, both ways."""
 _TOLERANCE = 1e-5
 """Largest violation of a row (m, m/s) that is accepted; much smaller than the planes' margin."""
-_BOUND = 1e-7
-"""Largest violation of a bound of acceleration or row (m, m/s, m/s²) of a dual solution that is accepted."""
 _MOST_BINDING = 64
 """Largest number of rows and bounds of a QP in its dual form."""
 _ROUNDED = 0.01
@@ -84,12 +85,12 @@ class Objective(NamedTuple):
 class Answer(NamedTuple):
     """Accelerations (n, 3), m/s², of a solution.
 
-    ``plane_multipliers`` (M, n, 3) ≥ 0: the multipliers of the planes' rows. ``rounds``: the number of QPs
-    solved.
+    ``push`` (3,): the force of the planes, the sum of their normals times the multipliers ≥ 0 of their rows.
+    ``rounds``: the number of QPs solved.
     """
 
     accelerations: Array
-    plane_multipliers: Array
+    push: Array
     rounds: int
 
 
@@ -103,36 +104,31 @@ class SeparationQp:
         self, steps: int, limits: LimitsConfig, config: CertifiedConfig, *, planar: bool = False
     ) -> None:
         n, dt = steps, config.dt_us * 1e-6
-        self.n = n
+        self.n, self.dt = n, dt
         S_v, self._S_x, _ = prediction(n, dt)
-        self.dt, self.S_v = dt, np.ascontiguousarray(S_v)
-        v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self.S_v, self._S_x))
-        # ``maps[b] @ a``: what the accelerations a add to control point b of each segment, (3, n, n).
-        self.maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x])
+        self._S_v = np.ascontiguousarray(S_v)
+        v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self._S_v, self._S_x))
+        # ``maps[i] @ a``: what accelerations a add to control point i of each segment, and to the velocity.
+        self._maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x, self._S_v])
         self.costs = {
-            moving: cost(config, self._S_x, self.S_v)
+            moving: cost(config, self._S_x, self._S_v)
             for moving, cost in ((False, arriving), (True, following))
         }
         self._P = {
             moving: np.asfortranarray(np.kron(np.eye(3), cost.P)) for moving, cost in self.costs.items()
         }
-        self._A = np.asfortranarray(np.kron(np.eye(3), self.S_v[-1:]))
+        self._A = np.asfortranarray(np.kron(np.eye(3), self._S_v[-1:]))
         # Memory of ``active_set``.
         most = _MOST_BINDING
         self._active = np.zeros(most, np.int64)
         self._images, self._gram = np.zeros((most, 3, n)), np.zeros((most, most))
         self._missing = np.zeros(most)
-        a_max = np.array(limits.u_max) - _ROUNDED
+        self._a_max: Array = np.array(limits.u_max) - _ROUNDED
         if planar:
             # The heights stay almost constant: an interior-point method needs an interior.
-            a_max[2] = _ROUNDED
-        self._a_max = np.repeat(a_max[:, None], n, axis=1)
-        v_max, low, high = (
-            np.repeat(np.array(bound, dtype=np.float64), n)
-            for bound in (limits.v_max, limits.box_min, limits.box_max)
-        )
-        # Speeds after each step, and control points except the first of each segment, both ways.
-        self.limits_low: Array = np.concatenate([-v_max, -v_max, low, -high, low, -high])
+            self._a_max[2] = _ROUNDED
+        v_max = np.array(limits.v_max)
+        self._ranges: Array = np.array([[limits.box_min, limits.box_max], [-v_max, v_max]], dtype=np.float64)
 
     def solve(self, state: State, objective: Objective, planes: Planes) -> Answer:
         """Return the best plan from ``state`` that keeps all rows.
@@ -141,7 +137,7 @@ class SeparationQp:
         the QP holds them.
         """
         n, cost = self.n, self.costs[objective.moving]
-        c, start = np.empty((3, n)), np.empty((3, n))
+        c, start, a_min, a_max = np.empty((4, 3, n))
         places, velocities, field = map(np.ascontiguousarray, objective[:3])
         write_cost(
             state.position,
@@ -155,62 +151,54 @@ class SeparationQp:
             cost.omega_speed,
             cost.omega_jerk,
             self._S_x,
-            self.S_v,
+            self._S_v,
+            cost.inverse,
+            cost.stopping,
             self.dt,
             c,
+            start,
         )
-        write_start(c, state.velocity, cost.inverse, cost.stopping, start)
-        flown = np.ascontiguousarray(state.committed.T)
-        low = np.empty(_KINDS * n + planes.normals.size)
-        row_bounds(
-            state.position, state.velocity, self.dt, self.limits_low, planes.normals, planes.wanted, low
-        )
+        most = _LIMITS * n + planes.wanted.size
+        rows = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
         # The planes are made so that the committed plan keeps them.
-        relax_limits(flown, self.dt, low)
-        bounds = np.minimum(-self._a_max, flown), np.maximum(self._a_max, flown)
-        problem = _Problem(objective.moving, c, start, flown, state.velocity, planes.normals, low, *bounds)
-        return self._by_active_set(problem) or self._by_rows(problem)
-
-    def _by_active_set(self, problem: _Problem) -> Answer | None:
-        """Return the solution of what binds; None if there is none, or if it violates a row or bound."""
-        count = active_set(
-            self.costs[problem.moving].inverse,
-            problem.start,
+        count_planes, count = rows_within(
+            state.position,
+            state.velocity,
             self.dt,
-            self.S_v,
-            self.maps,
-            problem.normals,
-            problem.low,
-            problem.a_min,
-            problem.a_max,
-            self._active,
-            self._images,
-            self._gram,
-            self._missing,
+            state.committed,
+            self._ranges,
+            planes.normals,
+            planes.wanted,
+            self._a_max,
+            a_min,
+            a_max,
+            *rows,
         )
+        of, normals, low = (part[:count] for part in rows)
+        problem = _Problem(c, start, of, normals, low, a_min, a_max)
+        return self._by_active_set(problem, count_planes, cost) or self._by_rows(
+            problem, count_planes, state, self._P[objective.moving]
+        )
+
+    def _by_active_set(self, problem: _Problem, planes: int, cost: Cost) -> Answer | None:
+        """Return the solution of what binds; None if there is none, or if it violates a row or bound.
+
+        The first ``planes`` rows are those of planes.
+        """
+        _, start, *rest = problem
+        memory = self._active, self._images, self._gram, self._missing
+        count = active_set(cost.inverse, start, self.dt, self._maps, *rest, *memory)
         if count < 0:
             return None
         try:
             multipliers = self._multipliers(count)
         except SolverError:
             return None
-        a, of_rows = np.empty((3, self.n)), np.zeros(len(problem.low))
-        violation = combine(
-            problem.start,
-            self._images,
-            multipliers,
-            self._active,
-            self.dt,
-            problem.normals,
-            problem.low,
-            problem.a_min,
-            problem.a_max,
-            a,
-            of_rows,
-        )
-        if not violation <= _BOUND:
+        a, push = np.empty((3, self.n)), np.empty(3)
+        found = start, self._images, multipliers, self._active, self.dt
+        if not combine(*found, *rest, planes, a, push) <= BOUND:
             return None
-        return Answer(a.T, self._of_planes(problem, of_rows), 1)
+        return Answer(a.T, push, 1)
 
     def _multipliers(self, count: int) -> Array:
         """Return the multipliers (count,) of the active set, by PIQP; raises SolverError without a result."""
@@ -220,58 +208,48 @@ class SeparationQp:
         result: Array = equation_solver(count, 0).solve(gram, -self._missing[:count]).x
         return result
 
-    def _by_rows(self, problem: _Problem) -> Answer:
+    def _by_rows(self, problem: _Problem, planes: int, state: State, P: Array) -> Answer:
         """Return PIQP's solution in the accelerations, with the rows that matter.
 
-        Raises SolverError as ``solve`` describes.
+        The first ``planes`` rows are those of planes. Raises SolverError as ``solve`` describes.
         """
-        best = np.minimum(np.maximum(problem.start, problem.a_min), problem.a_max)
-        candidates = self._slacks(problem, problem.flown) < _NEAR
+        c, start, of, normals, low, a_min, a_max = problem
+        best = np.minimum(np.maximum(start, a_min), a_max)
+        candidates = self._slacks(problem, state.committed.T) < _NEAR
         candidates |= self._slacks(problem, best) < 0.0
-        a_min, a_max = problem.a_min.ravel(), problem.a_max.ravel()
         for count in range(1, _ROUNDS + 1):
             chosen = np.flatnonzero(candidates)
             G = np.empty((len(chosen), 3, self.n))
-            write_rows(chosen, self.S_v, self.maps, problem.normals, G)
-            rows = G.reshape(len(chosen), 3 * self.n), problem.low[chosen]
-            found = solve_once(
-                self._P[problem.moving], problem.c.ravel(), self._A, -problem.velocity, *rows, a_min, a_max
-            )
+            write_rows(chosen, of, normals, self._maps, G)
+            rows = G.reshape(len(chosen), 3 * self.n), low[chosen]
+            found = solve_once(P, c.ravel(), self._A, -state.velocity, *rows, a_min.ravel(), a_max.ravel())
             a: Array = found.x.reshape(3, self.n)
             broken = self._slacks(problem, a) < -_TOLERANCE
             if not broken.any():
-                of_rows = np.zeros(len(candidates))
-                of_rows[chosen] = found.multipliers
-                return Answer(a.T, self._of_planes(problem, of_rows), count)
+                of_planes = chosen < planes
+                return Answer(a.T, found.multipliers[of_planes] @ normals[chosen[of_planes]], count)
             if not (broken & ~candidates).any():
                 break
             candidates |= broken
         raise SolverError("rows are broken", count)
 
     def _slacks(self, problem: _Problem, a: Array) -> Array:
-        """Return the slack G a − low of each row, negative if violated; ``a`` (3, n), m/s²."""
+        """Return the slack of each row, negative if violated; ``a`` (3, n), m/s²."""
         slack = np.empty(len(problem.low))
-        row_slacks(a, self.dt, problem.normals, problem.low, slack)
+        row_slacks(np.ascontiguousarray(a), self.dt, problem.of, problem.normals, problem.low, slack)
         return slack
-
-    def _of_planes(self, problem: _Problem, of_rows: Array) -> Array:
-        """Return the multipliers (M, n, 3) of the planes' rows, of those ``of_rows`` (R,)."""
-        return of_rows[_KINDS * self.n :].reshape(*problem.normals.shape[:2], 3)
 
 
 class _Problem(NamedTuple):
-    """One problem, by axis: c, the best plan without inequalities, and the committed accelerations, (3, n).
+    """One problem, by axis: c and the best plan without inequalities, (3, n).
 
-    ``moving``: whether the destination moves. ``velocity`` (3,); normals (M, n, 3) of the planes; ``low``
-    (R,) of the rows: first those of the limits, then those of the planes; bounds of the accelerations,
-    (3, n).
+    ``of`` (R,), ``normals`` (R, 3) and ``low`` (R,) are the rows of ``rows_within``; ``a_min``, ``a_max``
+    (3, n) the bounds of the accelerations.
     """
 
-    moving: bool
     c: Array
     start: Array
-    flown: Array
-    velocity: Array
+    of: NDArray[np.int64]
     normals: Array
     low: Array
     a_min: Array

@@ -1,9 +1,11 @@
 """Rows of the certified QP as kernels, and the active set: limits of speed and position, separating planes.
 
-Row r = kind·3n + axis·n + step of the limits: the kinds are +v and −v after the step, and the control points
-+q₁, −q₁, +q₂, −q₂ of its segment. The rows of plane m follow, in the order of step and control point: c·q_i,
-with c the plane's normal. A segment begins at q₀ = p with velocity v; q₁ = p + ½ dt v, q₂ =
-p + dt v + ½ dt² a. Accelerations a (3, n) are given by axis.
+A row bounds c·y from below: c (3,) is ± an axis for a limit, the normal for a plane, and y one of four
+results of each step k: number 4k + i for the control point q_i of its segment, 4k + 3 for the velocity after
+it. A segment begins at q₀ = p with velocity v; q₁ = p + ½ dt v, q₂ = p + dt v + ½ dt² a. Accelerations a
+(3, n) are given by axis. What they add to a result does not decrease with any of them; so between two bounds
+of a it is least at the lower one. A row that holds there for every axis holds for all accelerations within
+the bounds and is left out: most limits and half of the planes of near neighbours.
 
 ``active_set`` finds what binds by the dual method of D. Goldfarb and A. Idnani ("A numerically stable dual
 method for solving strictly convex quadratic programs", 1983): it begins at the minimiser without
@@ -19,9 +21,11 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.values.compiled import FLOAT, INT, VOID, array, kernel, output, part
+from companion.values.compiled import FLOAT, INT, VOID, array, kernel, output, part, several
 from companion.values.horizon import Array
 
+BOUND = 1e-7
+"""Violation of a bound of acceleration (m/s²) for which the rows that are left out hold."""
 _TOLERANCE = 1e-9
 """Violation of a constraint that is accepted (m, m/s, m/s²)."""
 _FLAT = 1e-11
@@ -32,84 +36,137 @@ _NEGATIVE = 1e-7
 
 
 @part
-def _limit_slacks(a: Array, dt: float, low: Array, slack: Array, points: Array) -> None:
-    """Write the slacks of the limits, and the control points (n, 3, 3) of the motion from rest at 0."""
-    n = a.shape[1]
-    block = 3 * n
+def _motion(a: Array, more: float, dt: float, results: Array) -> None:
+    """Write the ``results`` (4n, 3) of the motion from rest at 0 with ``more`` than each of ``a``."""
     for axis in range(3):
         p = v = 0.0
-        for k in range(n):
-            points[k, 0, axis] = p
-            points[k, 1, axis] = p + 0.5 * dt * v
-            p += dt * v + 0.5 * dt * dt * a[axis, k]
-            points[k, 2, axis] = p
-            v += dt * a[axis, k]
-            r = axis * n + k
-            slack[r] = v - low[r]
-            slack[block + r] = -v - low[block + r]
-            slack[2 * block + r] = points[k, 1, axis] - low[2 * block + r]
-            slack[3 * block + r] = -points[k, 1, axis] - low[3 * block + r]
-            slack[4 * block + r] = p - low[4 * block + r]
-            slack[5 * block + r] = -p - low[5 * block + r]
+        for k in range(a.shape[1]):
+            results[4 * k, axis] = p
+            results[4 * k + 1, axis] = p + 0.5 * dt * v
+            p += dt * v + 0.5 * dt * dt * (a[axis, k] + more)
+            results[4 * k + 2, axis] = p
+            v += dt * (a[axis, k] + more)
+            results[4 * k + 3, axis] = v
 
 
 @part
-def _slacks(a: Array, dt: float, normals: Array, low: Array, slack: Array, points: Array) -> None:
-    """Write the slacks of all rows; ``points`` (n, 3, 3) is scratch memory."""
-    n = a.shape[1]
-    _limit_slacks(a, dt, low, slack, points)
-    r = 18 * n
+def _slack(r: int, of: NDArray[np.int64], c: Array, low: Array, results: Array) -> float:
+    """Return the slack of row ``r``."""
+    y = results[of[r]]
+    return float(c[r, 0] * y[0] + c[r, 1] * y[1] + c[r, 2] * y[2] - low[r])
+
+
+@part
+def _write_row(r: int, of: NDArray[np.int64], c: Array, maps: Array, row: Array) -> None:
+    """Write row ``r`` of G to ``row`` (3, n)."""
+    i, k = of[r] % 4, of[r] // 4
+    for axis in range(3):
+        for j in range(maps.shape[1]):
+            row[axis, j] = c[r, axis] * maps[i, k, j]
+
+
+@kernel(
+    several(2, INT),
+    *[array(1)] * 2,
+    FLOAT,
+    array(2),
+    array(3),
+    *[array(3)] * 2,
+    array(1),
+    *[output(2)] * 2,
+    output(1, INT),
+    output(2),
+    output(1),
+)
+def rows_within(
+    position: Array,
+    velocity: Array,
+    dt: float,
+    committed: Array,
+    ranges: Array,
+    normals: Array,
+    wanted: Array,
+    a_max: Array,
+    x_min: Array,
+    x_max: Array,
+    of: NDArray[np.int64],
+    c: Array,
+    low: Array,
+) -> tuple[int, int]:
+    """Write the bounds of the accelerations, and the rows that some accelerations within them violate.
+
+    Returned are the number of rows of planes, which come first, and of all. ``position``, ``velocity`` (3,):
+    the state at the beginning; ``ranges`` (2, 2, 3): least and largest position and velocity; ``a_max`` (3,).
+    A bound or limit that the ``committed`` accelerations (n, 3) violate is relaxed to what they keep.
+    ``normals``, ``wanted`` (M, n, 3): the planes. Written are the bounds ``x_min``, ``x_max`` (3, n), and
+    arrays of length R ≥ 18n + 3nM: row r is ``c``·y ≥ ``low`` with the result y of number ``of``. No input
+    changes the first control point of all; it has no rows.
+    """
+    n = x_min.shape[1]
+    a, flown = np.empty((3, n)), np.empty((4 * n, 3))
+    lowest, highest = np.empty((4 * n, 3)), np.empty((4 * n, 3))
+    for axis in range(3):
+        for k in range(n):
+            a[axis, k] = committed[k, axis]
+            x_min[axis, k] = min(-a_max[axis], committed[k, axis])
+            x_max[axis, k] = max(a_max[axis], committed[k, axis])
+    _motion(a, 0.0, dt, flown)
+    _motion(x_min, -BOUND, dt, lowest)
+    _motion(x_max, BOUND, dt, highest)
+    count = 0
     for m in range(len(normals)):
         for k in range(n):
-            c = normals[m, k]
+            normal = normals[m, k]
             for i in range(3):
-                q = points[k, i]
-                slack[r] = c[0] * q[0] + c[1] * q[1] + c[2] * q[2] - low[r]
-                r += 1
+                y = 4 * k + i
+                least, bound = 0.0, wanted[m, k, i]
+                for axis in range(3):
+                    free = position[axis] + dt * (k + 0.5 * i) * velocity[axis]
+                    bound -= normal[axis] * free
+                    least += min(normal[axis] * lowest[y, axis], normal[axis] * highest[y, axis])
+                # What is not finite stays.
+                if not least >= bound and y > 0:
+                    of[count], low[count] = y, bound
+                    for axis in range(3):
+                        c[count, axis] = normal[axis]
+                    count += 1
+    planes = count
+    for y in range(1, 4 * n):
+        k, i = y // 4, y % 4
+        for axis in range(3):
+            if i == 0:
+                continue
+            free = velocity[axis] if i == 3 else position[axis] + dt * (k + 0.5 * i) * velocity[axis]
+            above = min(ranges[i // 3, 0, axis] - free, flown[y, axis])
+            below = min(free - ranges[i // 3, 1, axis], -flown[y, axis])
+            for sign in (1.0, -1.0):
+                bound = above if sign > 0.0 else below
+                least = lowest[y, axis] if sign > 0.0 else -highest[y, axis]
+                if not least >= bound:
+                    of[count], low[count] = y, bound
+                    c[count, 0] = c[count, 1] = c[count, 2] = 0.0
+                    c[count, axis] = sign
+                    count += 1
+    return planes, count
 
 
-@part
-def _write_row(r: int, S_v: Array, maps: Array, normals: Array, row: Array) -> None:
-    """Write row ``r`` of G to ``row`` (3, n)."""
-    n = len(S_v)
-    row[:] = 0.0
-    if r < 18 * n:
-        kind, axis, k = r // (3 * n), r % (3 * n) // n, r % n
-        sign = 1.0 if kind % 2 == 0 else -1.0
-        for j in range(n):
-            row[axis, j] = sign * (S_v[k, j] if kind < 2 else maps[kind // 2, k, j])
-        return
-    r -= 18 * n
-    m, k, i = r // (3 * n), r // 3 % n, r % 3
-    for axis in range(3):
-        for j in range(k + 1):
-            row[axis, j] = normals[m, k, axis] * maps[i, k, j]
-
-
-@kernel(VOID, array(2), FLOAT, array(3), array(1), output(1))
-def row_slacks(a: Array, dt: float, normals: Array, low: Array, slack: Array) -> None:
+@kernel(VOID, array(2), FLOAT, array(1, INT), array(2), array(1), output(1))
+def row_slacks(a: Array, dt: float, of: NDArray[np.int64], c: Array, low: Array, slack: Array) -> None:
     """Write ``slack`` = G a − ``low`` of all rows for the accelerations ``a`` (3, n), m/s²."""
-    _slacks(a, dt, normals, low, slack, np.empty((a.shape[1], 3, 3)))
+    results = np.empty((4 * a.shape[1], 3))
+    _motion(a, 0.0, dt, results)
+    for r in range(len(low)):
+        slack[r] = _slack(r, of, c, low, results)
 
 
-@kernel(VOID, array(2), FLOAT, output(1))
-def relax_limits(committed: Array, dt: float, low: Array) -> None:
-    """Lower the bounds ``low`` of the limits to what the ``committed`` accelerations (3, n) keep."""
-    n = committed.shape[1]
-    slack = np.empty(18 * n)
-    _limit_slacks(committed, dt, low, slack, np.empty((n, 3, 3)))
-    for r in range(18 * n):
-        low[r] += min(slack[r], 0.0)
-
-
-@kernel(VOID, array(1, INT), array(2), array(3), array(3), output(3))
-def write_rows(rows: NDArray[np.intp], S_v: Array, maps: Array, normals: Array, G: Array) -> None:
+@kernel(VOID, array(1, INT), array(1, INT), array(2), array(3), output(3))
+def write_rows(rows: NDArray[np.intp], of: NDArray[np.int64], c: Array, maps: Array, G: Array) -> None:
     """Write the given ``rows`` (R,) to ``G`` (R, 3, n).
 
-    ``S_v`` (n, n) maps accelerations to speeds; ``maps`` (3, n, n) map them to the control points.
+    ``maps`` (4, n, n) map accelerations to the control points and velocities of the steps.
     """
     for k in range(len(rows)):
-        _write_row(rows[k], S_v, maps, normals, G[k])
+        _write_row(rows[k], of, c, maps, G[k])
 
 
 @part
@@ -118,6 +175,15 @@ def _copy(source: Array, to: Array) -> None:
     for axis in range(3):
         for i in range(source.shape[1]):
             to[axis, i] = source[axis, i]
+
+
+@part
+def _finite(a: Array) -> bool:
+    total = 0.0
+    for axis in range(3):
+        for i in range(a.shape[1]):
+            total += a[axis, i]
+    return bool(np.isfinite(total))
 
 
 @part
@@ -131,21 +197,27 @@ def _inner(a: Array, b: Array) -> float:
 
 
 @part
-def _solve(M: Array, count: int, b: Array, L: Array) -> None:
-    """Solve M y = b by Cholesky for the first ``count`` unknowns; y replaces ``b``. ``L``: scratch memory."""
-    for i in range(count):
+def _factor(M: Array, first: int, count: int, L: Array) -> None:
+    """Write rows ``first`` to ``count`` of the Cholesky factor ``L`` of M, whose rows before are known."""
+    for i in range(first, count):
         for j in range(i + 1):
             rest = M[i, j]
             for k in range(j):
                 rest -= L[i, k] * L[j, k]
             L[i, j] = sqrt(max(rest, 1e-300)) if i == j else rest / L[j, j]
+
+
+@part
+def _solve(L: Array, count: int, b: Array) -> None:
+    """Replace the first ``count`` entries of ``b`` by the solution y of L Lᵀ y = b."""
+    for i in range(count):
         for k in range(i):
             b[i] -= L[i, k] * b[k]
         b[i] /= L[i, i]
     for i in range(count - 1, -1, -1):
-        for k in range(i + 1, count):
-            b[i] -= L[k, i] * b[k]
         b[i] /= L[i, i]
+        for k in range(i):
+            b[k] -= L[i, k] * b[i]
 
 
 @kernel(
@@ -153,9 +225,9 @@ def _solve(M: Array, count: int, b: Array, L: Array) -> None:
     array(2),
     array(2),
     FLOAT,
+    array(3),
+    array(1, INT),
     array(2),
-    array(3),
-    array(3),
     array(1),
     *[array(2)] * 2,
     output(1, INT),
@@ -167,9 +239,9 @@ def active_set(
     H: Array,
     start: Array,
     dt: float,
-    S_v: Array,
     maps: Array,
-    normals: Array,
+    of: NDArray[np.int64],
+    c: Array,
     low: Array,
     x_min: Array,
     x_max: Array,
@@ -181,23 +253,30 @@ def active_set(
     """Write what binds at the minimiser; return its number, or −1 without a result.
 
     ``start`` (3, n): the minimiser without inequalities; ``H`` (n, n): the inverse of the Hessian of each
-    axis on the space that the equalities leave. ``x_min``, ``x_max`` (3, n): bounds. Written are, for up to C
-    constraints, ``active`` (C,): rows, and from their number R on the 3n lower and the 3n upper bounds; the
-    ``images`` H Nᵀ (C, 3, n) of their normals N, the ``gram`` matrix N H Nᵀ (C, C), and what is ``missing``
-    (C,) at the start. −1 is also the result if more bind, or after ``_MAX_STEPS``.
+    axis on the space that the equalities leave. ``of``, ``c``, ``low``: the rows, see ``rows_within``.
+    ``x_min``, ``x_max`` (3, n): bounds. Written are, for up to C constraints, ``active`` (C,): rows, and from
+    their number R on the 3n lower and the 3n upper bounds; the ``images`` H Nᵀ (C, 3, n) of their normals N,
+    the ``gram`` matrix N H Nᵀ (C, C), and what is ``missing`` (C,) at the start. −1 is also the result if
+    more bind, or after ``_MAX_STEPS``.
     """
     n, rows, room = len(H), len(low), len(active)
-    x, slack, points = start.copy(), np.empty(rows), np.empty((n, 3, 3))
+    x, results = start.copy(), np.empty((4 * n, 3))
     normal_of, L = np.empty((room, 3, n)), np.empty((room, room))
     multipliers, r, z = np.zeros(room + 1), np.empty(room), np.empty((3, n))
     normal, image = np.empty((3, n)), np.empty((3, n))
     count, step = 0, 0
+    if not (_finite(start) and _finite(x_min) and _finite(x_max)):
+        return -1
+    for i in range(rows):
+        if not np.isfinite(low[i]):
+            return -1
     while True:
-        _slacks(x, dt, normals, low, slack, points)
+        _motion(x, 0.0, dt, results)
         worst, violation = -1, -_TOLERANCE
         for i in range(rows):
-            if not slack[i] >= violation:
-                worst, violation = i, slack[i]
+            slack = _slack(i, of, c, low, results)
+            if slack < violation:
+                worst, violation = i, slack
         for axis in range(3):
             for j in range(n):
                 if x[axis, j] - x_min[axis, j] < violation:
@@ -208,7 +287,7 @@ def active_set(
             return count
         # Normal n⁺ of the violated constraint, and H n⁺.
         if worst < rows:
-            _write_row(worst, S_v, maps, normals, normal)
+            _write_row(worst, of, c, maps, normal)
         else:
             normal[:] = 0.0
             bound = worst - rows
@@ -224,16 +303,19 @@ def active_set(
         for axis in range(3):
             for i in range(n):
                 short += normal[axis, i] * (start[axis, i] - x[axis, i])
+        if count == room:
+            return -1
+        for k in range(count):
+            gram[count, k] = gram[k, count] = _inner(normal_of[k], image)
         multiplier = 0.0
         while True:
             step += 1
-            # Not finite: the problem is not, either.
-            if step > _MAX_STEPS or not np.isfinite(violation):
+            if step > _MAX_STEPS:
                 return -1
             # Directions of the step: z = H n⁺ − H N r in x, and −r in the multipliers (N: active normals).
             for k in range(count):
-                r[k] = _inner(normal_of[k], image)
-            _solve(gram, count, r, L)
+                r[k] = gram[count, k]
+            _solve(L, count, r)
             _copy(image, z)
             for k in range(count):
                 for axis in range(3):
@@ -257,25 +339,26 @@ def active_set(
                         x[axis, i] += length * z[axis, i]
                 violation += length * curvature
             if primal <= dual:
-                if count == room:
-                    return -1
                 active[count], multipliers[count], missing[count] = worst, multiplier, -short
                 _copy(normal, normal_of[count])
                 _copy(image, images[count])
+                gram[count, count] = _inner(normal, image)
                 count += 1
-                for k in range(count):
-                    gram[k, count - 1] = gram[count - 1, k] = _inner(normal_of[k], image)
+                _factor(gram, count - 1, count, L)
                 break
-            count -= 1
+            # The row and column of n⁺ move up with those after the dropped one.
             for k in range(dropped, count):
-                active[k], multipliers[k], missing[k] = active[k + 1], multipliers[k + 1], missing[k + 1]
-                _copy(normal_of[k + 1], normal_of[k])
-                _copy(images[k + 1], images[k])
                 for i in range(count + 1):
                     gram[k, i] = gram[k + 1, i]
             for k in range(dropped, count):
                 for i in range(count):
                     gram[i, k] = gram[i, k + 1]
+            count -= 1
+            for k in range(dropped, count):
+                active[k], multipliers[k], missing[k] = active[k + 1], multipliers[k + 1], missing[k + 1]
+                _copy(normal_of[k + 1], normal_of[k])
+                _copy(images[k + 1], images[k])
+            _factor(gram, dropped, count, L)
 
 
 @kernel(
@@ -285,9 +368,11 @@ def active_set(
     array(1),
     array(1, INT),
     FLOAT,
-    array(3),
+    array(1, INT),
+    array(2),
     array(1),
     *[array(2)] * 2,
+    INT,
     output(2),
     output(1),
 )
@@ -297,20 +382,25 @@ def combine(
     multipliers: Array,
     active: NDArray[np.int64],
     dt: float,
-    normals: Array,
+    of: NDArray[np.int64],
+    c: Array,
     low: Array,
     x_min: Array,
     x_max: Array,
+    planes: int,
     x: Array,
-    of_rows: Array,
+    push: Array,
 ) -> float:
     """Write the minimiser ``x`` (3, n) for the ``multipliers`` (C,) of the ``active`` constraints.
 
-    Those of the rows go to ``of_rows`` (R,), which holds zeros. Returned is the largest violation of a row or
-    bound (m, m/s, m/s²); ∞ if a multiplier is negative by more than rounding, as x is not the minimiser then.
+    ``push`` (3,) is the sum of the normals times the multipliers of the first ``planes`` rows. Returned is
+    the largest violation of a row or bound (m, m/s, m/s²); ∞ if a multiplier is negative by more than
+    rounding, as x is not the minimiser then.
     """
-    n, rows, worst, largest = start.shape[1], len(low), 0.0, 1.0
-    x[:] = start
+    n, worst, largest = start.shape[1], 0.0, 1.0
+    _copy(start, x)
+    for axis in range(3):
+        push[axis] = 0.0
     for k in range(len(multipliers)):
         largest = max(largest, multipliers[k])
     for k in range(len(multipliers)):
@@ -319,12 +409,12 @@ def combine(
         for axis in range(3):
             for i in range(n):
                 x[axis, i] += multipliers[k] * images[k, axis, i]
-        if active[k] < rows:
-            of_rows[active[k]] = max(multipliers[k], 0.0)
-    slack = np.empty(rows)
-    _slacks(x, dt, normals, low, slack, np.empty((n, 3, 3)))
-    for r in range(rows):
-        worst = max(worst, -slack[r])
+            if active[k] < planes:
+                push[axis] += max(multipliers[k], 0.0) * c[active[k], axis]
+    results = np.empty((4 * n, 3))
+    _motion(x, 0.0, dt, results)
+    for r in range(len(low)):
+        worst = max(worst, -_slack(r, of, c, low, results))
     for axis in range(3):
         for i in range(n):
             worst = max(worst, x_min[axis, i] - x[axis, i], x[axis, i] - x_max[axis, i])
