@@ -23,7 +23,7 @@ from companion.avoidance.certified.committed import (
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.detour import Subgoal
 from companion.avoidance.certified.qp import Objective, SeparationQp, State
-from companion.avoidance.certified.separating_planes import Others, along, planes
+from companion.avoidance.certified.separating_planes import Others, kept, planes
 from companion.config.certified import CertifiedConfig
 from companion.errors import CertificateError, CompanionError, SolverError
 from companion.values.horizon import Array, Horizon, Motion
@@ -139,17 +139,18 @@ class Commitment:
             start.position_m, start.velocity_m_s, self._last_acceleration(), start.accelerations_m_s2
         )
         # Rounding may violate a plane that is only just kept: the second attempt adds the rounding error.
-        with_rounding = np.maximum(corridor.wanted, corridor.least + self._rounding)
-        for attempt in (corridor, corridor._replace(wanted=with_rounding)):
+        for attempt in range(2):
+            if attempt:
+                wanted = np.maximum(corridor.wanted, corridor.least + self._rounding)
+                corridor = corridor._replace(wanted=wanted)
             try:
-                answer = self._program.solve(state, objective, attempt)
+                answer = self._program.solve(state, objective, corridor)
                 plan = committed(start, answer.accelerations)
             except (SolverError, CertificateError):
                 continue
             points = controls(plan)
             # The rounded plan is checked, because the others receive the rounded one.
-            kept = along(corridor.normals, points) - corridor.least
-            if kept.min(initial=np.inf) >= 0.0:
+            if kept(corridor, points):
                 moving = objective.moving
                 gradient = self._program.costs[moving].gradient_per_metre
                 seconds = 1e-6 * self._config.epoch_us
@@ -193,10 +194,7 @@ class Commitment:
             or self._horizon_cache[0] is not self.current
             or self._horizon_cache[1] is not self.following
         ):
-            horizon = horizon_of(self.current)
-            if self.following is not None:
-                first, rest = horizon.knots[: self._config.knots], horizon_of(self.following).knots
-                horizon = horizon._replace(knots=np.vstack([first, rest]))
+            horizon = horizon_of(self.current, self.following, self._config.knots)
             self._horizon_cache = self.current, self.following, horizon
         return self._horizon_cache[2]
 
@@ -208,8 +206,7 @@ class Commitment:
         """Return the acceleration (3,), m/s², with which this epoch ends."""
         if self.current is None:
             return np.zeros(3)
-        result: Array = self.current.accelerations_m_s2[self._config.knots - 1]
-        return result
+        return 1e-3 * np.array(self.current.accelerations[self._config.knots - 1], dtype=np.float64)
 
     def _carried(self) -> tuple[WirePlan, Array]:
         """Return the committed plan from the next epoch on, and its control points (n, 3, 3), m."""

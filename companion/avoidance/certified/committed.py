@@ -8,12 +8,14 @@ all exact in integers.
 
 from __future__ import annotations
 
+from itertools import chain
 from math import sqrt
 
 import numpy as np
 import numpy.typing as npt
 
 from companion.errors import CertificateError
+from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, output, several
 from companion.values.horizon import Array, Horizon
 from mavlink_bridge.wire.plan import Integers, WirePlan, quantise
 
@@ -27,7 +29,7 @@ def resting(epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: in
 
 def rests(plan: WirePlan) -> bool:
     """Return whether the plan ends exactly at rest."""
-    return all(v + sum(a) == 0 for v, a in zip(plan.velocity, _by_axis(plan), strict=True))
+    return all(v + sum(a) == 0 for v, a in zip(plan.velocity, zip(*plan.accelerations, strict=True)))
 
 
 def carried_on(plan: WirePlan, knots: int) -> WirePlan:
@@ -39,10 +41,8 @@ def carried_on(plan: WirePlan, knots: int) -> WirePlan:
         raise CertificateError("a plan that does not end at rest cannot be carried on")
     steps = len(plan.accelerations)
     later = plan.shifted(min(knots, steps))
-    missing = steps - len(later.accelerations)
-    return later._replace(
-        epoch=plan.epoch + knots * plan.dt, accelerations=later.accelerations + ((0, 0, 0),) * missing
-    )
+    rest = ((0, 0, 0),) * (steps - len(later.accelerations))
+    return later._replace(epoch=plan.epoch + knots * plan.dt, accelerations=later.accelerations + rest)
 
 
 def committed(start: WirePlan, accelerations: Array) -> WirePlan:
@@ -51,10 +51,9 @@ def committed(start: WirePlan, accelerations: Array) -> WirePlan:
     They are rounded to the wire; the last one is replaced by the one that brings the plan to rest exactly.
     Raises CertificateError if one is not finite.
     """
-    if not np.isfinite(accelerations).all():
+    rounded = np.empty(accelerations.shape, np.int64)
+    if not _rounded(start.velocity, np.ascontiguousarray(accelerations), rounded):
         raise CertificateError("an acceleration is not finite")
-    rounded = np.rint(accelerations / _MM).astype(np.int64)
-    rounded[-1] = -np.array(start.velocity) - rounded[:-1].sum(axis=0)
     knots: tuple[Integers, ...] = tuple((x, y, z) for x, y, z in rounded.tolist())
     return start._replace(accelerations=knots)
 
@@ -73,20 +72,25 @@ def rounding(steps: int, dt: int) -> Array:
 
 def controls(plan: WirePlan) -> Array:
     """Return control points (n, 3, 3) of the segments, m, fleet-local ENU."""
-    states = plan.states()
-    position, velocity = states[:, 0], states[:, 1]
-    points = np.stack([position[:-1], position[:-1] + velocity[:-1], position[1:]], axis=1)
-    return points * (0.5 * _MM * (plan.dt * 1e-6) ** 2)
+    accelerations = _accelerations(plan)
+    points = np.empty((len(accelerations), 3, 3))
+    _controls(plan.position, plan.velocity, accelerations, 0.5 * _MM * (plan.dt * 1e-6) ** 2, points)
+    return points
 
 
-def horizon_of(plan: WirePlan) -> Horizon:
-    """Return the plan as a horizon, in metres; beyond its end it rests."""
-    states = plan.states()
+def horizon_of(plan: WirePlan, following: WirePlan | None = None, after: int = 0) -> Horizon:
+    """Return the plan as a horizon, in metres; beyond its end it rests.
+
+    If a plan is ``following`` after a number of knots, the horizon goes on with that plan.
+    """
+    first = len(plan.accelerations) if following is None else after
+    last = 0 if following is None else len(following.accelerations) + 1
+    knots = np.empty((first + max(last, 1), 9))
     seconds = plan.dt * 1e-6
-    knots = np.zeros((len(states), 9))
-    knots[:, 0:3] = states[:, 0] * (0.5 * _MM * seconds**2)
-    knots[:, 3:6] = states[:, 1] * (_MM * seconds)
-    knots[:-1, 6:9] = plan.accelerations_m_s2
+    units = 0.5 * _MM * seconds**2, _MM * seconds
+    _knots(plan.position, plan.velocity, _accelerations(plan)[:first], *units, knots[: first + 1])
+    if following is not None:
+        _knots(following.position, following.velocity, _accelerations(following), *units, knots[first:])
     return Horizon(plan.epoch, plan.dt, knots)
 
 
@@ -96,5 +100,57 @@ def rest_time(horizon: Horizon) -> int:
     return horizon.epoch + horizon.dt * (int(moves[-1]) + 1 if len(moves) else 0)
 
 
-def _by_axis(plan: WirePlan) -> list[list[int]]:
-    return [[a[axis] for a in plan.accelerations] for axis in range(3)]
+def _accelerations(plan: WirePlan) -> npt.NDArray[np.int64]:
+    """Return the accelerations (n, 3) in units of the wire."""
+    flat = chain.from_iterable(plan.accelerations)
+    return np.fromiter(flat, np.int64, 3 * len(plan.accelerations)).reshape(-1, 3)
+
+
+@kernel(BOOL, several(3, INT), array(2), output(2, INT))
+def _rounded(velocity: Integers, accelerations: Array, rounded: npt.NDArray[np.int64]) -> bool:
+    """Write the ``rounded`` accelerations (n, 3) that end at rest; return whether all are finite."""
+    n = len(accelerations)
+    for axis in range(3):
+        left = -velocity[axis]
+        for k in range(n):
+            if not np.isfinite(accelerations[k, axis]):
+                return False
+            rounded[k, axis] = left if k == n - 1 else int(np.rint(accelerations[k, axis] / _MM))
+            left -= rounded[k, axis]
+    return True
+
+
+@kernel(VOID, *[several(3, INT)] * 2, array(2, INT), FLOAT, output(3))
+def _controls(
+    position: Integers, velocity: Integers, accelerations: npt.NDArray[np.int64], unit: float, points: Array
+) -> None:
+    """Write the control points (n, 3, 3) of a plan in units of the wire; ``unit``: that of positions (m)."""
+    for axis in range(3):
+        p, v = position[axis], velocity[axis]
+        for k in range(len(accelerations)):
+            a = accelerations[k, axis]
+            points[k, 0, axis], points[k, 1, axis], points[k, 2, axis] = (
+                p * unit,
+                (p + v) * unit,
+                (p + 2 * v + a) * unit,
+            )
+            p, v = p + 2 * v + a, v + a
+
+
+@kernel(VOID, *[several(3, INT)] * 2, array(2, INT), FLOAT, FLOAT, output(2))
+def _knots(
+    position: Integers,
+    velocity: Integers,
+    accelerations: npt.NDArray[np.int64],
+    metre: float,
+    speed: float,
+    knots: Array,
+) -> None:
+    """Write the ``knots`` (n + 1, 9) of a ``Horizon``; ``metre`` and ``speed`` (m, m/s) are the units."""
+    n = len(accelerations)
+    for axis in range(3):
+        p, v = position[axis], velocity[axis]
+        for k in range(n + 1):
+            a = accelerations[k, axis] if k < n else 0
+            knots[k, axis], knots[k, 3 + axis], knots[k, 6 + axis] = p * metre, v * speed, a * 1e-3
+            p, v = p + 2 * v + a, v + a

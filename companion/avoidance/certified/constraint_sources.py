@@ -13,6 +13,7 @@ from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.committed import horizon_of
 from companion.avoidance.certified.margins import beside, between, fastest, margin
 from companion.avoidance.certified.noncooperative import NonCooperative
+from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.separating_planes import Others
 from companion.avoidance.certified.visibility_graph import Discs
 from companion.config import CompanionConfig
@@ -58,41 +59,41 @@ class ConstraintSources:
         ``own`` (n, 3, 3), m: the committed control points from the next epoch on.
         """
         begins = epoch + self._config.certified.epoch_us
-        agreed = agreements.agreed()
-        aside = self._beside_last_plan(now, agreements, world)
+        agreed, left = agreements.agreed(), agreements.left
+        aside = self._beside_last_plan(now, left, world)
         # A vehicle that said farewell may drift while it descends. One that is further than ``between`` from
         # its last plan may be flown by another controller, at any height: it counts as non-cooperative while
         # it sends. Once it is silent it counts as landed at its last position, as it may be switched off.
         taken_over = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
-        members = agreements.members.union(agreements.left.keys() - taken_over) - agreements.away
+        members = agreements.members.union(left.keys() - taken_over) - agreements.away
         seen = self._noncooperative.seen(begins, members, world)
         noncooperative = [
             *self._noncooperative.balls(seen, own),
             *self._noncooperative.target(now, begins, view),
         ]
         sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
-        ends = [filed.controls[-1, 2] for filed in agreements.left.values()]
+        ends = [filed.controls[-1, 2] for filed in left.values()]
         landed = [*ends, *(place for system, (_, place, _) in aside.items() if system not in taken_over)]
-        final = [last.later(begins, self._steps) for last in agreements.left.values()]
-        unshared = [
-            *((plan, np.full(self._steps, self.between)) for plan in final),
+        final = [last.later(begins, self._steps) for last in left.values()]
+        unshared: list[tuple[Array, Array | float]] = [
+            *((plan, self.between) for plan in final),
             *self._fixed_constraints(own),
             *self._landed_constraints(own, landed),
             *noncooperative,
             *self._sensed_constraints(sensed),
         ]
         count, n = len(agreed), self._steps
-        bases, controls = (np.empty((count + len(unshared), n, 3, 3)) for _ in range(2))
-        bases[:] = own
+        bases, controls = np.empty((2, count + len(unshared), n, 3, 3))
         for index, pair in enumerate(agreed):
             bases[index], controls[index] = pair.own.later(begins, n), pair.other.later(begins, n)
-        distance = np.full((len(controls), n), self.between)
+        bases[count:] = own
+        distance, shares = np.full((len(controls), n), self.between), np.zeros(len(controls), np.bool_)
+        shares[:count] = True
         for index, (centres, radii) in enumerate(unshared, count):
             controls[index], distance[index] = centres, radii
-        others = Others(bases, controls, distance, np.arange(len(controls)) < count)
-        return others, self._noncooperative.field(seen, own, sensed)
+        return Others(bases, controls, distance, shares), self._noncooperative.field(seen, own, sensed)
 
-    def _fixed_constraints(self, own: Array) -> list[tuple[Array, Array]]:
+    def _fixed_constraints(self, own: Array) -> list[tuple[Array, float]]:
         """Return the fixed obstacles near the plan: spheres at their centres, posts at the plan's height.
 
         So posts act as if they had no top.
@@ -108,10 +109,10 @@ class ConstraintSources:
                 if upright:
                     centres[..., 2] = own[..., 2]
                 least = self._config.field.d_min + radius + self._margin
-                found.append((centres, np.full(self._steps, least)))
+                found.append((centres, least))
         return found
 
-    def _sensed_constraints(self, sensed: Axes) -> list[tuple[Array, Array]]:
+    def _sensed_constraints(self, sensed: Axes) -> list[tuple[Array, float]]:
         """Return what sensors detect, and the predicted paths of traffic, as fixed obstacles.
 
         If an obstacle appears nearer to the committed plan than the least distance, its planes keep only the
@@ -120,20 +121,19 @@ class ConstraintSources:
         least = self._config.field.d_min + self._margin
         places = sensed.positions.reshape(-1, self._steps, 3, 3)
         return [
-            (place, np.full(self._steps, least + radius))
+            (place, least + radius)
             for place, radius in zip(places, sensed.radius, strict=True)
         ]
 
     def _beside_last_plan(
-        self, now: int, agreements: Agreements, world: World
+        self, now: int, left: dict[int, StoredPlan], world: World
     ) -> dict[int, tuple[float, Array, bool]]:
-        """Return the vehicles that said farewell and have since reported a position beside their last plan.
+        """Return the vehicles that ``left`` and have since reported a position beside their last plan.
 
         The values, by system id, are the horizontal distance (m) from this plan, the position (3,), m, and
         whether messages still arrive. Differences up to ``margins.beside`` are tolerated.
         """
         found: dict[int, tuple[float, Array, bool]] = {}
-        left = agreements.left
         if not left:
             return found
         for system, time, position, _ in world.neighbours.last_received():
@@ -145,7 +145,7 @@ class ConstraintSources:
                 found[system] = off, position, now - time <= self._silent_us
         return found
 
-    def _landed_constraints(self, own: Array, places: list[Array]) -> list[tuple[Array, Array]]:
+    def _landed_constraints(self, own: Array, places: list[Array]) -> list[tuple[Array, float]]:
         """Return constraints at ``places`` (3,) of vehicles that said farewell, descending or on the ground.
 
         No vehicle flies over them: heights do not count.
@@ -154,7 +154,7 @@ class ConstraintSources:
         for place in places:
             centres = own.copy()
             centres[..., :2] = place[:2]
-            found.append((centres, np.full(self._steps, self.between)))
+            found.append((centres, self.between))
         return found
 
     def resting(self, epoch: int, heights: tuple[float, float], agreements: Agreements) -> list[Discs]:

@@ -16,6 +16,8 @@ otherwise it decreases.
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
 from companion.config.certified import DeadlockConfig
@@ -48,8 +50,10 @@ class DeadlockTurn:
 
         On a turn above ``bend`` it is at most ``detour`` (m) away.
         """
+        if self.angle == 0.0:
+            return goal
         offset = goal - position
-        length = float(np.sqrt(offset @ offset))
+        length = sqrt(offset @ offset)
         if self.angle > self._config.bend and length > self._config.detour:
             offset = offset * (self._config.detour / length)
         return position + turned(offset, -self._sense * self.angle)
@@ -85,7 +89,7 @@ class DeadlockTurn:
         """
         config = self._config
         offset = goal - rest
-        direct = float(np.sqrt(offset @ offset))
+        direct = sqrt(offset @ offset)
         distance = direct + beyond
         direction = offset / max(direct, 1e-6)
         approach_speed = np.inf if self._distance is None else (self._distance - distance) / seconds

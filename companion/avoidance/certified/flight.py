@@ -207,7 +207,8 @@ class CertifiedFlight:
         Those of a destination that moves are on its path, all shifted by the offset of ``goal`` from its end.
         """
         if aim.path is None:
-            places = np.broadcast_to(goal, field.shape)
+            places = np.empty(field.shape)
+            places[:] = goal
             return Objective(places, np.zeros(field.shape), field)
         positions, velocities = aim.path(begins + self._seconds)
         (end,), _ = aim.path(np.array([self.lookahead_s]))

@@ -17,30 +17,28 @@ _RECENT = 24
 
 
 class StoredPlan(NamedTuple):
-    """Plan with its control points (n, 3, 3), m."""
+    """Plan with its control points (n, 3, 3), m; ``rested`` (3n, 3, 3): these and those of its rest."""
 
     plan: WirePlan
     controls: Array
+    rested: Array
 
     def later(self, epoch: int, rows: int) -> Array:
-        """Return ``rows`` control points (rows, 3, 3), m, from ``epoch`` (µs) on; after its end it rests.
+        """Return ``rows`` ≤ 2n control points (rows, 3, 3), m, from ``epoch`` (µs) on.
 
-        ``epoch`` is a knot, and not before the plan's own epoch.
+        After its end the plan rests. ``epoch`` is a knot, and not before the plan's own epoch.
         """
-        points = self.controls
-        first = min((epoch - self.plan.epoch) // self.plan.dt, len(points))
-        result = np.empty((rows, 3, 3))
-        left = min(len(points) - first, rows)
-        result[:left] = points[first : first + left]
-        result[left:] = points[-1, 2]
-        return result
+        first = min((epoch - self.plan.epoch) // self.plan.dt, len(self.controls))
+        return self.rested[first : first + rows]
 
 
 def stored(plan: WirePlan) -> StoredPlan:
     """Return ``plan`` with its control points, which are read-only."""
     points = controls(plan)
-    points.flags.writeable = False
-    return StoredPlan(plan, points)
+    rested = np.empty((3 * len(points), 3, 3))
+    rested[: len(points)], rested[len(points) :] = points, points[-1, 2]
+    rested.flags.writeable = False
+    return StoredPlan(plan, rested[: len(points)], rested)
 
 
 @lru_cache(maxsize=512)

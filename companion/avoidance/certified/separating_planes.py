@@ -60,7 +60,7 @@ def planes(committed: Array, others: Others, spare: float, *, upright: bool = Fa
 
     ``spare`` (m) is wanted beyond the least distance. ``upright``: heights do not count.
     """
-    found = Planes(*(np.empty((*others.distance.shape, 3)) for _ in Planes._fields))
+    found = Planes(*np.empty((3, *others.distance.shape, 3)))
     # The kernel needs contiguous arrays; those of a flight are contiguous already.
     committed, own, controls, distance = map(
         np.ascontiguousarray, (committed, others.own, others.controls, others.distance)
@@ -76,7 +76,7 @@ def keeps(newest: Array, own: Array, other: Array, distance: Array, *, upright: 
     """
     pair = Others(own[None], other[None], distance, np.ones(1, dtype=np.bool_))
     found = planes(newest, pair, 0.0, upright=upright)
-    return bool((along(found.normals, newest) >= found.least).all())
+    return kept(found, newest)
 
 
 def apart(one: Array, two: Array, distance: float, *, upright: bool = False) -> bool:
@@ -87,14 +87,12 @@ def apart(one: Array, two: Array, distance: float, *, upright: bool = False) -> 
     return bool((hull_distance(relative) >= distance).all())
 
 
-def along(normals: Array, points: Array) -> Array:
-    """Return c·q (M, n, 3), m, of control points (n, 3, 3), m, along the ``normals`` (M, n, 3).
+def kept(planes: Planes, points: Array) -> bool:
+    """Return whether control points (n, 3, 3), m, keep ``least`` of all planes.
 
     Its rounding is that of ``planes``: the committed plan keeps its planes exactly.
     """
-    result = np.empty((*normals.shape[:2], 3))
-    _along(normals, np.ascontiguousarray(points), result)
-    return result
+    return _kept(planes.normals, planes.least, np.ascontiguousarray(points))
 
 
 def nearest(triangles: Array) -> Array:
@@ -199,9 +197,11 @@ def _planes(
                 wanted[m, n, i] = max(least[m, n, i], min(spared, _dot(c, committed[n, i])))
 
 
-@kernel(VOID, array(3), array(3), output(3))
-def _along(normals: Array, points: Array, result: Array) -> None:
+@kernel(BOOL, array(3), array(3), array(3))
+def _kept(normals: Array, least: Array, points: Array) -> bool:
     for m in range(len(normals)):
         for n in range(len(points)):
             for i in range(3):
-                result[m, n, i] = _dot(normals[m, n], points[n, i])
+                if not _dot(normals[m, n], points[n, i]) >= least[m, n, i]:
+                    return False
+    return True
