@@ -27,5 +27,5 @@ def wrapped(angles: Array) -> Array:
 def turned(vector: Array, angle: float) -> Array:
     """Return ``vector`` (3,) rotated about the vertical by ``angle`` (rad), counter-clockwise from above."""
     c, s = cos(angle), sin(angle)
-    x, y, z = vector
+    x, y, z = vector.tolist()
     return np.array([c * x - s * y, s * x + c * y, z])

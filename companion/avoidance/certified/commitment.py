@@ -15,6 +15,7 @@ import numpy as np
 from companion.avoidance.certified.committed import (
     carried_on,
     committed,
+    committed_with_controls,
     controls,
     horizon_of,
     resting,
@@ -145,10 +146,9 @@ class Commitment:
                 corridor = corridor._replace(wanted=wanted)
             try:
                 answer = self._program.solve(state, objective, corridor)
-                plan = committed(start, answer.accelerations)
+                plan, points = committed_with_controls(start, answer.accelerations)
             except (SolverError, CertificateError):
                 continue
-            points = controls(plan)
             # The rounded plan is checked, because the others receive the rounded one.
             if kept(corridor, points):
                 moving = objective.moving

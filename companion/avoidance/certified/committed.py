@@ -51,11 +51,17 @@ def committed(start: WirePlan, accelerations: Array) -> WirePlan:
     They are rounded to the wire; the last one is replaced by the one that brings the plan to rest exactly.
     Raises CertificateError if one is not finite.
     """
+    return committed_with_controls(start, accelerations)[0]
+
+
+def committed_with_controls(start: WirePlan, accelerations: Array) -> tuple[WirePlan, Array]:
+    """Return the plan of ``committed`` and its ``controls``."""
     rounded = np.empty(accelerations.shape, np.int64)
     if not _rounded(start.velocity, np.ascontiguousarray(accelerations), rounded):
         raise CertificateError("an acceleration is not finite")
     knots: tuple[Integers, ...] = tuple((x, y, z) for x, y, z in rounded.tolist())
-    return start._replace(accelerations=knots)
+    plan = WirePlan(start.epoch, start.dt, start.position, start.velocity, knots, start.origin)
+    return plan, _controls_of(plan, rounded)
 
 
 def rounding(steps: int, dt: int) -> Array:
@@ -72,7 +78,10 @@ def rounding(steps: int, dt: int) -> Array:
 
 def controls(plan: WirePlan) -> Array:
     """Return control points (n, 3, 3) of the segments, m, fleet-local ENU."""
-    accelerations = _accelerations(plan)
+    return _controls_of(plan, _accelerations(plan))
+
+
+def _controls_of(plan: WirePlan, accelerations: npt.NDArray[np.int64]) -> Array:
     points = np.empty((len(accelerations), 3, 3))
     _controls(plan.position, plan.velocity, accelerations, 0.5 * _MM * (plan.dt * 1e-6) ** 2, points)
     return points

@@ -91,7 +91,6 @@ class DeadlockTurn:
         offset = goal - rest
         direct = sqrt(offset @ offset)
         distance = direct + beyond
-        direction = offset / max(direct, 1e-6)
         approach_speed = np.inf if self._distance is None else (self._distance - distance) / seconds
         self._distance = distance
         if moving:
@@ -101,10 +100,11 @@ class DeadlockTurn:
         else:
             self._waited += seconds
         overtime = max(0.0, self._waited - config.patience)
-        push_back = -float(push @ direction)
+        nearly = max(direct, 1e-6)
+        push_back = -float(push @ offset) / nearly
         if overtime > 0.0:
             # After ``patience`` without progress, a push back along the turned direction counts, too.
-            push_back = max(push_back, -float(push @ turned(direction, -self._sense * self.angle)))
+            push_back = max(push_back, -float(push @ turned(offset, -self._sense * self.angle)) / nearly)
         pushed = min(max(push_back / (gradient_per_metre * max(direct, _MIN_PULL_DISTANCE_M)), 0.0), 1.0)
         pushed *= min(max(1.0 - approach_speed / config.speed, 0.0), 1.0)
         if pushed > config.pushed:

@@ -118,11 +118,14 @@ class SeparationQp:
             moving: np.asfortranarray(np.kron(np.eye(3), cost.P)) for moving, cost in self.costs.items()
         }
         self._A = np.asfortranarray(np.kron(np.eye(3), self._S_v[-1:]))
-        # Memory of ``active_set``.
+        # Memory of ``active_set``, and its parts that are the QP in its dual form, by the number that binds.
         most = _MOST_BINDING
-        self._active = np.zeros(most, np.int64)
-        self._images, self._gram = np.zeros((most, 3, n)), np.zeros((most, most))
-        self._missing = np.zeros(most)
+        self._active, self._images = np.zeros(most, np.int64), np.zeros((most, 3, n))
+        self._gram, self._missing = np.zeros(most * most), np.zeros(most)
+        self._duals = [
+            (self._gram[: size * size].reshape(size, size).T, self._missing[:size])
+            for size in range(most + 1)
+        ]
         self._a_max: Array = np.array(limits.u_max) - _ROUNDED
         if planar:
             # The heights stay almost constant: an interior-point method needs an interior.
@@ -204,8 +207,7 @@ class SeparationQp:
         """Return the multipliers (count,) of the active set, by PIQP; raises SolverError without a result."""
         if count == 0:
             return np.zeros(0)
-        gram = np.asfortranarray(self._gram[:count, :count])
-        result: Array = equation_solver(count, 0).solve(gram, -self._missing[:count]).x
+        result: Array = equation_solver(count, 0).solve(*self._duals[count]).x
         return result
 
     def _by_rows(self, problem: _Problem, planes: int, state: State, P: Array) -> Answer:

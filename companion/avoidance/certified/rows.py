@@ -234,8 +234,7 @@ def _solve(L: Array, count: int, b: Array) -> None:
     *[array(2)] * 2,
     output(1, INT),
     output(3),
-    output(2),
-    output(1),
+    *[output(1)] * 2,
 )
 def active_set(
     H: Array,
@@ -249,21 +248,22 @@ def active_set(
     x_max: Array,
     active: NDArray[np.int64],
     images: Array,
-    gram: Array,
-    missing: Array,
+    dual_P: Array,
+    dual_c: Array,
 ) -> int:
     """Write what binds at the minimiser; return its number, or −1 without a result.
 
     ``start`` (3, n): the minimiser without inequalities; ``H`` (n, n): the inverse of the Hessian of each
     axis on the space that the equalities leave. ``of``, ``c``, ``low``: the rows, see ``rows_within``.
     ``x_min``, ``x_max`` (3, n): bounds. Written are, for up to C constraints, ``active`` (C,): rows, and from
-    their number R on the 3n lower and the 3n upper bounds; the ``images`` H Nᵀ (C, 3, n) of their normals N,
-    the ``gram`` matrix N H Nᵀ (C, C), and what is ``missing`` (C,) at the start. −1 is also the result if
-    more bind, or after ``_MAX_STEPS``.
+    their number R on the 3n lower and the 3n upper bounds; and the ``images`` H Nᵀ (C, 3, n) of their
+    normals N; the multipliers y minimise ½ yᵀ dual_P y + dual_cᵀ y: N H Nᵀ (C², filled from the beginning)
+    and the violations (C,) at the start, negative. −1 is also the result if more bind, or after
+    ``_MAX_STEPS``.
     """
     n, rows, room = len(H), len(low), len(active)
     x, results = start.copy(), np.empty((4 * n, 3))
-    normal_of, L = np.empty((room, 3, n)), np.empty((room, room))
+    normal_of, gram, L = np.empty((room, 3, n)), np.empty((room, room)), np.empty((room, room))
     multipliers, r, z = np.zeros(room + 1), np.empty(room), np.empty((3, n))
     normal, image = np.empty((3, n)), np.empty((3, n))
     count, step = 0, 0
@@ -286,6 +286,9 @@ def active_set(
                 if x_max[axis, j] - x[axis, j] < violation:
                     worst, violation = rows + (3 + axis) * n + j, x_max[axis, j] - x[axis, j]
         if worst < 0:
+            for k in range(count):
+                for i in range(count):
+                    dual_P[k * count + i] = gram[k, i]
             return count
         # Normal n⁺ of the violated constraint, and H n⁺.
         if worst < rows:
@@ -341,7 +344,7 @@ def active_set(
                         x[axis, i] += length * z[axis, i]
                 violation += length * curvature
             if primal <= dual:
-                active[count], multipliers[count], missing[count] = worst, multiplier, -short
+                active[count], multipliers[count], dual_c[count] = worst, multiplier, short
                 _copy(normal, normal_of[count])
                 _copy(image, images[count])
                 gram[count, count] = _inner(normal, image)
@@ -357,7 +360,7 @@ def active_set(
                     gram[i, k] = gram[i, k + 1]
             count -= 1
             for k in range(dropped, count):
-                active[k], multipliers[k], missing[k] = active[k + 1], multipliers[k + 1], missing[k + 1]
+                active[k], multipliers[k], dual_c[k] = active[k + 1], multipliers[k + 1], dual_c[k + 1]
                 _copy(normal_of[k + 1], normal_of[k])
                 _copy(images[k + 1], images[k])
             _factor(gram, dropped, count, L)
