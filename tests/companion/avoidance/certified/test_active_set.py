@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from companion.avoidance.certified.qp_vectors import row_bounds
 from companion.avoidance.certified.rows import active_set, combine, write_rows
 from companion.values.horizon import Array
 from companion.values.prediction import prediction
@@ -25,8 +24,8 @@ class Qp(NamedTuple):
 
     one: Array
     c: Array
-    S_v: Array
     maps: Array
+    of: NDArray[np.int64]
     normals: Array
     low: Array
     x_min: Array
@@ -43,8 +42,13 @@ class Found(NamedTuple):
     size: int
     active: NDArray[np.int64]
     images: Array
-    gram: Array
-    missing: Array
+    dual_P: Array
+    dual_c: Array
+
+    def multipliers(self, count: int) -> Array:
+        """Multipliers (count,) if only the first ``count`` constraints are held."""
+        gram = self.dual_P[: self.size**2].reshape(self.size, self.size)[:count, :count]
+        return np.asarray(-np.linalg.solve(gram, self.dual_c[:count]), dtype=np.float64)
 
 
 def draw(seed: int) -> Qp:
@@ -52,43 +56,40 @@ def draw(seed: int) -> Qp:
     n, planes = int(rng.integers(2, 13)), int(rng.integers(0, 5))
     S_v, S_x, _ = prediction(n, DT)
     v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (S_v, S_x))
-    maps = np.stack([x, x + 0.5 * DT * v, S_x])
+    maps = np.stack([x, x + 0.5 * DT * v, S_x, S_v])
     root = rng.normal(size=(n, n))
     inside = rng.normal(size=(3, n))
-    normals = rng.normal(size=(planes, n, 3))
-    low = np.empty(18 * n + normals.size)
-    none = np.zeros(3)
-    row_bounds(none, none, DT, np.zeros(18 * n), normals, np.zeros_like(normals), low)
-    finite = np.flatnonzero(np.isfinite(low))
-    G = np.empty((len(finite), 3, n))
-    write_rows(finite, np.ascontiguousarray(S_v), maps, normals, G)
-    room = rng.uniform(0.01, 0.5) * rng.uniform(0.1, 2.0, len(finite))
-    low[finite] = np.einsum("rij,ij->r", G, inside) - room
+    # Rows of planes, and limits along an axis, of all results but the first control point.
+    results = np.tile(np.arange(1, 4 * n), 6 + planes)
+    normals = rng.normal(size=(len(results), 3))
+    normals[: 6 * (4 * n - 1)] = np.repeat(np.vstack([np.eye(3), -np.eye(3)]), 4 * n - 1, axis=0)
+    G = np.empty((len(results), 3, n))
+    write_rows(np.arange(len(results)), results, normals, maps, G)
+    room = rng.uniform(0.01, 0.5) * rng.uniform(0.1, 2.0, len(results))
+    low: Array = np.einsum("rij,ij->r", G, inside) - room
     half = rng.uniform(0.1, 2.0, (2, 3, n))
     one = root @ root.T + np.eye(n)
     c = 10.0 * rng.normal(size=(3, n))
-    return Qp(one, c, np.ascontiguousarray(S_v), maps, normals, low, inside - half[0], inside + half[1])
+    return Qp(one, c, maps, results, normals, low, inside - half[0], inside + half[1])
 
 
 def find(qp: Qp) -> Found:
     n = len(qp.one)
-    memory = np.zeros(MOST, np.int64), np.zeros((MOST, 3, n)), np.zeros((MOST, MOST)), np.zeros(MOST)
+    memory = np.zeros(MOST, np.int64), np.zeros((MOST, 3, n)), np.zeros(MOST * MOST), np.zeros(MOST)
     H: Array = np.asarray(np.linalg.inv(qp.one), dtype=np.float64)
-    rows = qp.S_v, qp.maps, qp.normals, qp.low
-    count = active_set(H, qp.start, DT, *rows, qp.x_min, qp.x_max, *memory)
+    count = active_set(H, qp.start, DT, qp.maps, *qp[3:], *memory)
     return Found(count, *memory)
 
 
 def minimiser(qp: Qp) -> Array:
     """Minimiser (3, n) with all rows and bounds, by another solver."""
     n = len(qp.one)
-    finite = np.flatnonzero(np.isfinite(qp.low))
-    G = np.empty((len(finite), 3, n))
-    write_rows(finite, qp.S_v, qp.maps, qp.normals, G)
-    upper = np.concatenate([qp.x_max.ravel(), np.full(len(finite), 1e30)])
-    lower = np.concatenate([qp.x_min.ravel(), qp.low[finite]])
+    G = np.empty((len(qp.low), 3, n))
+    write_rows(np.arange(len(qp.low)), qp.of, qp.normals, qp.maps, G)
+    upper = np.concatenate([qp.x_max.ravel(), np.full(len(qp.low), 1e30)])
+    lower = np.concatenate([qp.x_min.ravel(), qp.low])
     P, sense = np.kron(np.eye(3), qp.one), np.zeros(len(upper), dtype=np.int32)
-    matrix = np.ascontiguousarray(G.reshape(len(finite), -1))
+    matrix = np.ascontiguousarray(G.reshape(len(qp.low), -1))
     x, _, flag, _ = daqp.solve(P, qp.c.ravel(), matrix, upper, lower, sense, primal_tol=1e-11)
     assert flag == 1
     result: Array = x.reshape(3, n)
@@ -101,14 +102,14 @@ def test_what_binds_determines_the_minimiser(seed: int) -> None:
     found = find(qp)
     assert found.size >= 0
     k = found.size
-    multipliers: Array = np.asarray(np.linalg.solve(found.gram[:k, :k], found.missing[:k]), dtype=np.float64)
-    x, of_rows = np.empty_like(qp.c), np.zeros(len(qp.low))
-    rest = DT, qp.normals, qp.low, qp.x_min, qp.x_max
-    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, of_rows)
+    multipliers, planes = found.multipliers(k), 6 * (4 * len(qp.one) - 1)
+    x, push = np.empty_like(qp.c), np.empty(3)
+    rest = DT, *qp[3:], planes
+    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, push)
     assert violation < 1e-7
     np.testing.assert_allclose(x, minimiser(qp), rtol=0.0, atol=1e-5)
-    rows = found.active[:k][found.active[:k] < len(qp.low)]
-    assert set(np.flatnonzero(of_rows)) <= set(rows)
+    first = found.active[:k] < planes
+    np.testing.assert_allclose(push, multipliers[first] @ qp.normals[found.active[:k][first]], atol=1e-9)
 
 
 @given(seeds)
@@ -119,13 +120,13 @@ def test_another_set_is_not_taken_for_it(seed: int) -> None:
     if found.size < 1:
         return
     k = found.size - 1
-    multipliers: Array = np.asarray(np.linalg.solve(found.gram[:k, :k], found.missing[:k]), dtype=np.float64)
-    x, of_rows = np.empty_like(qp.c), np.zeros(len(qp.low))
-    rest = DT, qp.normals, qp.low, qp.x_min, qp.x_max
-    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, of_rows)
+    multipliers, planes = found.multipliers(k), 6 * (4 * len(qp.one) - 1)
+    x, push = np.empty_like(qp.c), np.empty(3)
+    rest = DT, *qp[3:], planes
+    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, push)
     assert violation > 1e-9 or np.abs(x - minimiser(qp)).max() < 1e-5
     negative = np.concatenate([multipliers, [-1.0]])
-    assert combine(qp.start, found.images, negative, found.active, *rest, x, of_rows) == np.inf
+    assert combine(qp.start, found.images, negative, found.active, *rest, x, push) == np.inf
 
 
 @pytest.mark.parametrize("value", [np.nan, 3.0])

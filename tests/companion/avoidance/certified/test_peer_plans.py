@@ -35,8 +35,8 @@ def test_what_is_stored_is_not_altered() -> None:
     one = stored(plan(0))
     with pytest.raises(ValueError, match="read-only"):
         one.controls[0, 0, 0] = 1.0
-    later = one.later(EPOCH, STEPS)
-    later += 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        one.later(EPOCH, STEPS)[0, 0, 0] = 1.0
     np.testing.assert_array_equal(one.later(EPOCH, STEPS), controls(plan(0)))
 
 

@@ -1,44 +1,133 @@
-"""Rows of the certified QP: slacks and matrix agree, and are those of the motion."""
+"""Rows of the certified QP: slacks and matrix agree, are those of the motion, and those left out hold."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from companion.avoidance.certified.qp_vectors import row_bounds
-from companion.avoidance.certified.rows import relax_limits, row_slacks, write_rows
+from companion.avoidance.certified.rows import BOUND, row_slacks, rows_within, write_rows
+from companion.values.horizon import Array
 from companion.values.prediction import prediction
 
+DT = 0.1
+draws = given(st.integers(0, 2**32 - 1), st.integers(2, 16), st.integers(0, 4), st.sampled_from([0.1, 1, 30]))
 
-@given(st.integers(0, 2**32 - 1), st.integers(2, 16), st.integers(0, 4))
-def test_slacks_are_the_rows_times_the_accelerations(seed: int, n: int, count: int) -> None:
+
+class Drawn(NamedTuple):
+    """State, committed accelerations, limits and planes; ``all`` (R,): what the motion leaves of each row."""
+
+    position: Array
+    velocity: Array
+    committed: Array
+    ranges: Array
+    normals: Array
+    wanted: Array
+    a_max: Array
+
+    def slack(self, a: Array) -> Array:
+        """Slack (R,) of all rows, by the motion with accelerations (n, 3) itself."""
+        moved, relaxed = self._moved(a), self._moved(self.committed)
+        points, speeds = moved
+        low, high = self.ranges
+        limits = []
+        for part, (least, most), there in (
+            (speeds, self.ranges[1], relaxed[1]),
+            (points[:, 1], self.ranges[0], relaxed[0][:, 1]),
+            (points[:, 2], self.ranges[0], relaxed[0][:, 2]),
+        ):
+            limits += [part - np.minimum(least, there), np.maximum(most, there) - part]
+        planes = np.einsum("mnk,nik->mni", self.normals, points) - self.wanted
+        planes[:, 0, 0] = np.inf
+        return np.concatenate([planes.ravel(), *(part.ravel() for part in limits)])
+
+    def _moved(self, a: Array) -> tuple[Array, Array]:
+        """Control points (n, 3, 3) and velocities (n, 3) after the steps."""
+        speeds = self.velocity + DT * np.cumsum(a, axis=0)
+        before = np.vstack([self.velocity, speeds[:-1]])
+        ends = self.position + np.cumsum(DT * before + 0.5 * DT * DT * a, axis=0)
+        begins = np.vstack([self.position, ends[:-1]])
+        return np.stack([begins, begins + 0.5 * DT * before, ends], axis=1), speeds
+
+
+class Rows(NamedTuple):
+    planes: int
+    of: NDArray[np.int64]
+    c: Array
+    low: Array
+    x_min: Array
+    x_max: Array
+
+
+def draw(seed: int, n: int, count: int, size: float) -> Drawn:
     rng = np.random.default_rng(seed)
-    dt = 0.1
-    S_v, S_x, _ = prediction(n, dt)
-    v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (S_v, S_x))
-    maps = np.stack([x, x + 0.5 * dt * v, S_x])
+    ranges = np.sort(size * rng.normal(size=(2, 2, 3)), axis=1)
     normals, wanted = rng.normal(size=(2, count, n, 3))
-    position, velocity, a = rng.normal(size=3), rng.normal(size=3), rng.normal(size=(n, 3))
-    limits = rng.normal(size=18 * n)
-    low, slack = np.empty((2, 18 * n + 3 * count * n))
-    row_bounds(position, velocity, dt, limits, normals, wanted, low)
-    row_slacks(np.ascontiguousarray(a.T), dt, normals, low, slack)
-    finite = np.flatnonzero(np.isfinite(low))
-    assert len(low) - len(finite) == count
-    G = np.empty((len(finite), 3, n))
-    write_rows(finite, np.ascontiguousarray(S_v), maps, normals, G)
-    np.testing.assert_allclose(np.einsum("rij,ji->r", G, a) - low[finite], slack[finite], atol=1e-12)
-    # The same from the motion: speeds and control points from the state, along axes and normals.
-    times = dt * (np.arange(n)[:, None] + np.array([0.0, 0.5, 1.0]))
-    points = position + times[:, :, None] * velocity + np.einsum("bij,jk->ibk", maps, a)
-    speeds = velocity + S_v @ a
-    moved = [s * part.T.ravel() for part in (speeds, points[:, 1], points[:, 2]) for s in (1.0, -1.0)]
-    planes = np.einsum("mnk,nik->mni", normals, points) - wanted
-    expected = np.concatenate([np.concatenate(moved) - limits, planes.ravel()])
-    np.testing.assert_allclose(slack[finite], expected[finite], atol=1e-12)
-    # Limits that are violated, and they alone, are lowered until they just hold.
-    relaxed = low.copy()
-    relax_limits(np.ascontiguousarray(a.T), dt, relaxed)
-    lowered = np.where(np.arange(len(low)) < len(limits), np.minimum(slack, 0.0), 0.0)
-    np.testing.assert_allclose(relaxed[finite], (low + lowered)[finite], atol=1e-12)
+    state = rng.normal(size=(2, 3))
+    return Drawn(*state, rng.normal(size=(n, 3)), ranges, normals, size * wanted, rng.uniform(0.1, 2.0, 3))
+
+
+def written(drawn: Drawn) -> Rows:
+    n = len(drawn.committed)
+    most, bounds = 18 * n + drawn.wanted.size, np.empty((2, 3, n))
+    rows = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
+    planes, count = rows_within(
+        drawn.position, drawn.velocity, DT, *drawn[2:], bounds[0], bounds[1], *rows
+    )
+    of, c, low = (part[:count] for part in rows)
+    return Rows(planes, of, c, low, *bounds)
+
+
+@draws
+def test_slacks_are_those_of_the_motion_and_of_the_matrix(seed: int, n: int, count: int, size: float) -> None:
+    drawn = draw(seed, n, count, size)
+    rows = written(drawn)
+    a = np.random.default_rng(seed + 1).normal(size=(n, 3))
+    slack = np.empty(len(rows.low))
+    row_slacks(np.ascontiguousarray(a.T), DT, rows.of, rows.c, rows.low, slack)
+    S_v, S_x, _ = prediction(n, DT)
+    v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (S_v, S_x))
+    G = np.empty((len(rows.low), 3, n))
+    write_rows(
+        np.arange(len(rows.low)), rows.of, rows.c, np.stack([x, x + 0.5 * DT * v, S_x, S_v]), G
+    )
+    np.testing.assert_allclose(np.einsum("rij,ji->r", G, a) - rows.low, slack, rtol=0.0, atol=1e-10)
+    every = drawn.slack(a)
+    for one in slack:
+        assert np.abs(every - one).min() < 1e-9
+    of_planes = every[: drawn.wanted.size]
+    for one in slack[: rows.planes]:
+        assert np.abs(of_planes - one).min() < 1e-9
+
+
+@draws
+def test_what_is_left_out_holds_for_all_accelerations_within_their_bounds(
+    seed: int, n: int, count: int, size: float
+) -> None:
+    """Each row of the motion is written, or the plan that is worst for it keeps it."""
+    drawn = draw(seed, n, count, size)
+    rows, rng = written(drawn), np.random.default_rng(seed + 1)
+    np.testing.assert_array_equal(rows.x_min.T, np.minimum(-drawn.a_max, drawn.committed))
+    np.testing.assert_array_equal(rows.x_max.T, np.maximum(drawn.a_max, drawn.committed))
+    for _ in range(20):
+        # Corners of the bounds are the worst; what a dual solution may violate them by counts, too.
+        upper = rng.uniform(size=(n, 3)) < rng.uniform()
+        if rng.uniform() < 0.5:
+            upper[:] = rng.uniform(size=3) < 0.5
+        a = np.where(upper, rows.x_max.T + BOUND, rows.x_min.T - BOUND)
+        slack, every = np.empty(len(rows.low)), drawn.slack(a)
+        row_slacks(np.ascontiguousarray(a.T), DT, rows.of, rows.c, rows.low, slack)
+        violated = every[every < -1e-9]
+        assert (slack < -1e-9 + 1e-10).sum() >= len(violated)
+        for one in violated:
+            assert np.abs(slack - one).min() < 1e-9
+
+
+def test_most_rows_of_wide_limits_are_left_out_and_none_that_is_not_finite() -> None:
+    drawn = draw(0, 16, 3, 30.0)
+    assert len(written(drawn).low) < 0.5 * len(drawn.slack(drawn.committed))
+    drawn.wanted[1, 3, 1] = np.nan
+    assert np.isnan(written(drawn).low).sum() == 1

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from companion.avoidance.certified.separating_planes import (
     Others,
     Planes,
-    along,
     hull_distance,
     keeps,
+    kept,
     nearest,
     planes,
 )
@@ -174,10 +174,11 @@ class Pair:
 def test_the_committed_plans_keep_to_their_sides(seed: int, upright: bool) -> None:
     pair = Pair(seed, upright=upright)
     for p, own in zip(pair.planes, pair.points, strict=True):
-        here = along(p.normals, own)
-        np.testing.assert_allclose(here, np.einsum("mnk,nik->mni", p.normals, own), rtol=0.0, atol=1e-12)
-        assert (here >= p.least).all()
-        assert (here >= p.wanted).all()
+        assert kept(p, own)
+        assert kept(p._replace(least=p.wanted), own)
+        here = np.einsum("mnk,nik->mni", p.normals, own)
+        assert not kept(p._replace(least=here + 1e-12), own)
+        assert not kept(p, own * np.nan)
         assert (p.wanted >= p.least).all()
         assert (p.wanted <= p.least + SPARE + 1e-12).all()
     if upright:
