@@ -29,7 +29,7 @@ def resting(epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: in
 
 def rests(plan: WirePlan) -> bool:
     """Return whether the plan ends exactly at rest."""
-    return all(v + sum(a) == 0 for v, a in zip(plan.velocity, zip(*plan.accelerations, strict=True)))
+    return not any(map(sum, zip(plan.velocity, *plan.accelerations, strict=True)))
 
 
 def carried_on(plan: WirePlan, knots: int) -> WirePlan:

@@ -162,7 +162,7 @@ class SeparationQp:
             start,
         )
         most = _LIMITS * n + planes.wanted.size
-        rows = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
+        of, normals, low = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
         # The planes are made so that the committed plan keeps them.
         count_planes, count = rows_within(
             state.position,
@@ -175,10 +175,11 @@ class SeparationQp:
             self._a_max,
             a_min,
             a_max,
-            *rows,
+            of,
+            normals,
+            low,
         )
-        of, normals, low = (part[:count] for part in rows)
-        problem = _Problem(c, start, of, normals, low, a_min, a_max)
+        problem = _Problem(c, start, of[:count], normals[:count], low[:count], a_min, a_max)
         return self._by_active_set(problem, count_planes, cost) or self._by_rows(
             problem, count_planes, state, self._P[objective.moving]
         )
@@ -188,9 +189,22 @@ class SeparationQp:
 
         The first ``planes`` rows are those of planes.
         """
-        _, start, *rest = problem
-        memory = self._active, self._images, self._gram, self._missing
-        count = active_set(cost.inverse, start, self.dt, self._maps, *rest, *memory)
+        _, start, of, normals, low, a_min, a_max = problem
+        count = active_set(
+            cost.inverse,
+            start,
+            self.dt,
+            self._maps,
+            of,
+            normals,
+            low,
+            a_min,
+            a_max,
+            self._active,
+            self._images,
+            self._gram,
+            self._missing,
+        )
         if count < 0:
             return None
         try:
@@ -198,10 +212,22 @@ class SeparationQp:
         except SolverError:
             return None
         a, push = np.empty((3, self.n)), np.empty(3)
-        found = start, self._images, multipliers, self._active, self.dt
-        if not combine(*found, *rest, planes, a, push) <= BOUND:
-            return None
-        return Answer(a.T, push, 1)
+        violation = combine(
+            start,
+            self._images,
+            multipliers,
+            self._active,
+            self.dt,
+            of,
+            normals,
+            low,
+            a_min,
+            a_max,
+            planes,
+            a,
+            push,
+        )
+        return Answer(a.T, push, 1) if violation <= BOUND else None
 
     def _multipliers(self, count: int) -> Array:
         """Return the multipliers (count,) of the active set, by PIQP; raises SolverError without a result."""

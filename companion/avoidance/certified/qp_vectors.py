@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from companion.values.compiled import FLOAT, VOID, array, kernel, output
 from companion.values.horizon import Array
 

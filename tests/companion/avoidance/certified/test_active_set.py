@@ -42,13 +42,13 @@ class Found(NamedTuple):
     size: int
     active: NDArray[np.int64]
     images: Array
-    dual_P: Array
-    dual_c: Array
+    hessian: Array
+    linear: Array
 
     def multipliers(self, count: int) -> Array:
         """Multipliers (count,) if only the first ``count`` constraints are held."""
-        gram = self.dual_P[: self.size**2].reshape(self.size, self.size)[:count, :count]
-        return np.asarray(-np.linalg.solve(gram, self.dual_c[:count]), dtype=np.float64)
+        gram = self.hessian[: self.size**2].reshape(self.size, self.size)[:count, :count]
+        return np.asarray(-np.linalg.solve(gram, self.linear[:count]), dtype=np.float64)
 
 
 def draw(seed: int) -> Qp:

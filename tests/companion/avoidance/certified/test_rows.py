@@ -32,7 +32,6 @@ class Drawn(NamedTuple):
         """Slack (R,) of all rows, by the motion with accelerations (n, 3) itself."""
         moved, relaxed = self._moved(a), self._moved(self.committed)
         points, speeds = moved
-        low, high = self.ranges
         limits = []
         for part, (least, most), there in (
             (speeds, self.ranges[1], relaxed[1]),
@@ -74,9 +73,7 @@ def written(drawn: Drawn) -> Rows:
     n = len(drawn.committed)
     most, bounds = 18 * n + drawn.wanted.size, np.empty((2, 3, n))
     rows = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
-    planes, count = rows_within(
-        drawn.position, drawn.velocity, DT, *drawn[2:], bounds[0], bounds[1], *rows
-    )
+    planes, count = rows_within(drawn.position, drawn.velocity, DT, *drawn[2:], bounds[0], bounds[1], *rows)
     of, c, low = (part[:count] for part in rows)
     return Rows(planes, of, c, low, *bounds)
 
@@ -91,9 +88,7 @@ def test_slacks_are_those_of_the_motion_and_of_the_matrix(seed: int, n: int, cou
     S_v, S_x, _ = prediction(n, DT)
     v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (S_v, S_x))
     G = np.empty((len(rows.low), 3, n))
-    write_rows(
-        np.arange(len(rows.low)), rows.of, rows.c, np.stack([x, x + 0.5 * DT * v, S_x, S_v]), G
-    )
+    write_rows(np.arange(len(rows.low)), rows.of, rows.c, np.stack([x, x + 0.5 * DT * v, S_x, S_v]), G)
     np.testing.assert_allclose(np.einsum("rij,ji->r", G, a) - rows.low, slack, rtol=0.0, atol=1e-10)
     every = drawn.slack(a)
     for one in slack:
