@@ -29,7 +29,8 @@ def resting(epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: in
 
 def rests(plan: WirePlan) -> bool:
     """Return whether the plan ends exactly at rest."""
-    return not any(map(sum, zip(plan.velocity, *plan.accelerations, strict=True)))
+    changes = [plan.velocity, *plan.accelerations]
+    return not any(map(sum, zip(*changes, strict=True)))
 
 
 def carried_on(plan: WirePlan, knots: int) -> WirePlan:

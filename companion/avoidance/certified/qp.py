@@ -17,7 +17,7 @@ in every problem.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +114,14 @@ class SeparationQp:
             moving: cost(config, self._S_x, self._S_v)
             for moving, cost in ((False, arriving), (True, following))
         }
+        # Constant arguments of ``write_cost``.
+        self._cost_parts: dict[bool, tuple[Any, ...]] = {
+            moving: (
+                *(cost.places, cost.fields, cost.omega_speed, cost.omega_jerk),
+                *(self._S_x, self._S_v, cost.inverse, cost.stopping, dt),
+            )
+            for moving, cost in self.costs.items()
+        }
         self._P = {
             moving: np.asfortranarray(np.kron(np.eye(3), cost.P)) for moving, cost in self.costs.items()
         }
@@ -142,42 +150,13 @@ class SeparationQp:
         n, cost = self.n, self.costs[objective.moving]
         c, start, a_min, a_max = np.empty((4, 3, n))
         places, velocities, field = map(np.ascontiguousarray, objective[:3])
-        write_cost(
-            state.position,
-            state.velocity,
-            state.before,
-            places,
-            velocities,
-            field,
-            cost.places,
-            cost.fields,
-            cost.omega_speed,
-            cost.omega_jerk,
-            self._S_x,
-            self._S_v,
-            cost.inverse,
-            cost.stopping,
-            self.dt,
-            c,
-            start,
-        )
+        write_cost(*state[:3], places, velocities, field, *self._cost_parts[objective.moving], c, start)
         most = _LIMITS * n + planes.wanted.size
         of, normals, low = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
         # The planes are made so that the committed plan keeps them.
+        known: tuple[Any, ...] = state.position, state.velocity, self.dt, state.committed, self._ranges
         count_planes, count = rows_within(
-            state.position,
-            state.velocity,
-            self.dt,
-            state.committed,
-            self._ranges,
-            planes.normals,
-            planes.wanted,
-            self._a_max,
-            a_min,
-            a_max,
-            of,
-            normals,
-            low,
+            *known, planes.normals, planes.wanted, self._a_max, a_min, a_max, of, normals, low
         )
         problem = _Problem(c, start, of[:count], normals[:count], low[:count], a_min, a_max)
         return self._by_active_set(problem, count_planes, cost) or self._by_rows(
@@ -189,22 +168,9 @@ class SeparationQp:
 
         The first ``planes`` rows are those of planes.
         """
-        _, start, of, normals, low, a_min, a_max = problem
-        count = active_set(
-            cost.inverse,
-            start,
-            self.dt,
-            self._maps,
-            of,
-            normals,
-            low,
-            a_min,
-            a_max,
-            self._active,
-            self._images,
-            self._gram,
-            self._missing,
-        )
+        rows: Any = problem[2:]
+        memory: tuple[Any, ...] = self._active, self._images, self._gram, self._missing
+        count = active_set(cost.inverse, problem.start, self.dt, self._maps, *rows, *memory)
         if count < 0:
             return None
         try:
@@ -212,21 +178,8 @@ class SeparationQp:
         except SolverError:
             return None
         a, push = np.empty((3, self.n)), np.empty(3)
-        violation = combine(
-            start,
-            self._images,
-            multipliers,
-            self._active,
-            self.dt,
-            of,
-            normals,
-            low,
-            a_min,
-            a_max,
-            planes,
-            a,
-            push,
-        )
+        found: tuple[Any, ...] = problem.start, self._images, multipliers, self._active, self.dt
+        violation = combine(*found, *rows, planes, a, push)
         return Answer(a.T, push, 1) if violation <= BOUND else None
 
     def _multipliers(self, count: int) -> Array:
