@@ -29,8 +29,7 @@ def resting(epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: in
 
 def rests(plan: WirePlan) -> bool:
     """Return whether the plan ends exactly at rest."""
-    changes = [plan.velocity, *plan.accelerations]
-    return not any(map(sum, zip(*changes, strict=True)))
+    return not any(sum(a[axis] for a in plan.accelerations) + plan.velocity[axis] for axis in range(3))
 
 
 def carried_on(plan: WirePlan, knots: int) -> WirePlan:

@@ -115,7 +115,7 @@ class SeparationQp:
             for moving, cost in ((False, arriving), (True, following))
         }
         # Constant arguments of ``write_cost``.
-        self._cost_parts: dict[bool, tuple[Any, ...]] = {
+        self._cost_parts: dict[bool, Any] = {
             moving: (
                 *(cost.places, cost.fields, cost.omega_speed, cost.omega_jerk),
                 *(self._S_x, self._S_v, cost.inverse, cost.stopping, dt),
@@ -150,14 +150,14 @@ class SeparationQp:
         n, cost = self.n, self.costs[objective.moving]
         c, start, a_min, a_max = np.empty((4, 3, n))
         places, velocities, field = map(np.ascontiguousarray, objective[:3])
-        write_cost(*state[:3], places, velocities, field, *self._cost_parts[objective.moving], c, start)
+        known: Any = *state[:3], places, velocities, field, *self._cost_parts[objective.moving], c, start
+        write_cost(*known)
         most = _LIMITS * n + planes.wanted.size
         of, normals, low = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
         # The planes are made so that the committed plan keeps them.
-        known: tuple[Any, ...] = state.position, state.velocity, self.dt, state.committed, self._ranges
-        count_planes, count = rows_within(
-            *known, planes.normals, planes.wanted, self._a_max, a_min, a_max, of, normals, low
-        )
+        known = state.position, state.velocity, self.dt, state.committed, self._ranges
+        known += planes.normals, planes.wanted, self._a_max, a_min, a_max, of, normals, low
+        count_planes, count = rows_within(*known)
         problem = _Problem(c, start, of[:count], normals[:count], low[:count], a_min, a_max)
         return self._by_active_set(problem, count_planes, cost) or self._by_rows(
             problem, count_planes, state, self._P[objective.moving]
@@ -169,7 +169,7 @@ class SeparationQp:
         The first ``planes`` rows are those of planes.
         """
         rows: Any = problem[2:]
-        memory: tuple[Any, ...] = self._active, self._images, self._gram, self._missing
+        memory: Any = self._active, self._images, self._gram, self._missing
         count = active_set(cost.inverse, problem.start, self.dt, self._maps, *rows, *memory)
         if count < 0:
             return None
@@ -178,9 +178,8 @@ class SeparationQp:
         except SolverError:
             return None
         a, push = np.empty((3, self.n)), np.empty(3)
-        found: tuple[Any, ...] = problem.start, self._images, multipliers, self._active, self.dt
-        violation = combine(*found, *rows, planes, a, push)
-        return Answer(a.T, push, 1) if violation <= BOUND else None
+        found: Any = problem.start, self._images, multipliers, self._active, self.dt, *rows, planes, a, push
+        return Answer(a.T, push, 1) if combine(*found) <= BOUND else None
 
     def _multipliers(self, count: int) -> Array:
         """Return the multipliers (count,) of the active set, by PIQP; raises SolverError without a result."""
