@@ -29,7 +29,7 @@ def resting(epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: in
 
 def rests(plan: WirePlan) -> bool:
     """Return whether the plan ends exactly at rest."""
-    return not any(sum(a[axis] for a in plan.accelerations) + plan.velocity[axis] for axis in range(3))
+    return not any(map(sum, zip(plan.velocity, *plan.accelerations, strict=True)))
 
 
 def carried_on(plan: WirePlan, knots: int) -> WirePlan:
@@ -56,7 +56,7 @@ def committed(start: WirePlan, accelerations: Array) -> WirePlan:
 
 def committed_with_controls(start: WirePlan, accelerations: Array) -> tuple[WirePlan, Array]:
     """Return the plan of ``committed`` and its ``controls``."""
-    rounded = np.empty(accelerations.shape, np.int64)
+    rounded: npt.NDArray[np.int64] = np.empty(accelerations.shape, np.int64)
     if not _rounded(start.velocity, np.ascontiguousarray(accelerations), rounded):
         raise CertificateError("an acceleration is not finite")
     knots: tuple[Integers, ...] = tuple((x, y, z) for x, y, z in rounded.tolist())
