@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from companion.avoidance.certified import commitment, qp
+from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.qp import SeparationQp
 from companion.avoidance.field import planner
 from companion.avoidance.field.dqmpc import Dqmpc
@@ -36,10 +37,13 @@ FIELD: Mapping[str, Stage] = {
     "set-point": (field, "setpoint"),
 }
 CERTIFIED: Mapping[str, Stage] = {
+    "constraint sources": (ConstraintSources, "around"),
     "planes": (commitment, "planes"),
     "QP": (SeparationQp, "solve"),
+    "rows": (qp, "rows_within"),
     "binding rows": (qp, "active_set"),
     "PIQP": (SeparationQp, "_multipliers"),
+    "rounding": (commitment, "committed_with_controls"),
     "yaw": (Heading, "plan"),
     "set-point": (certified, "setpoint"),
 }
@@ -48,7 +52,7 @@ CERTIFIED: Mapping[str, Stage] = {
 def measured() -> dict[str, dict[str, float]]:
     """Return the median time (µs of wall time) of each stage of a field plan and of a certified plan.
 
-    A stage that calls another one includes it, as ``QP`` includes ``binding rows`` and ``PIQP``.
+    A stage that calls another one includes it, as ``QP`` includes ``rows``, ``binding rows`` and ``PIQP``.
     """
     found = {}
     for mode, of, run in (("field", FIELD, field.plan_step), ("certified", CERTIFIED, certified.plan_step)):
