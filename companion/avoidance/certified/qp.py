@@ -5,7 +5,8 @@ and adds the field to the acceleration. Here every step is weighted (``cost``), 
 linear term −2 Ω_f f·x of every step: it moves the positions within the constraints. A plan that ends at rest
 could not follow a lasting push with its accelerations. The plan ends at rest.
 
-Bounds of acceleration are bounds on variables. Limits of speed and position and the planes are rows Ga ≥ low.
+Bounds of acceleration are bounds on variables. Limits of speed and position, the planes and bounds on jerk
+are rows Ga ≥ low.
 ``active_set`` finds what binds, about ten of seven hundred. PIQP solves the QP with that in its dual form:
 with as many variables as bind, the multipliers. Its solution is checked against all rows and bounds. Where it
 violates one, or no active set is found, PIQP solves in the accelerations, with the rows that matter: those
@@ -96,7 +97,9 @@ class Answer(NamedTuple):
 class SeparationQp:
     """Matrices of the QP for ``steps`` accelerations; call ``solve`` for each plan.
 
-    ``planar``: the vertical acceleration is bounded to ±0.01 m/s², so that the height stays.
+    ``planar``: the vertical acceleration is bounded to ±0.01 m/s², so that the height stays. With
+    ``limits.j_max`` the acceleration changes by at most j_max·dt from step to step, from the one before the
+    plan to the rest after its end.
     """
 
     def __init__(
@@ -127,6 +130,10 @@ class SeparationQp:
             # The heights stay almost constant: an interior-point method needs an interior.
             a_max[2] = _ROUNDED
         self._a_max = np.repeat(a_max[:, None], n, axis=1)
+        self._change: Array | None = None
+        if limits.j_max is not None:
+            self._change = np.array(limits.j_max) * dt
+            self._a_max[:, -1] = np.minimum(a_max, self._change)
         v_max, low, high = (
             np.repeat(np.array(bound, dtype=np.float64), n)
             for bound in (limits.v_max, limits.box_min, limits.box_max)
@@ -161,15 +168,36 @@ class SeparationQp:
         )
         write_start(c, state.velocity, cost.inverse, cost.stopping, start)
         flown = np.ascontiguousarray(state.committed.T)
-        low = np.empty(_KINDS * n + planes.normals.size)
+        count = _KINDS * n + planes.normals.size
+        low = np.empty(count if self._change is None else count + 6 * n)
         row_bounds(
             state.position, state.velocity, self.dt, self.limits_low, planes.normals, planes.wanted, low
         )
         # The planes are made so that the committed plan keeps them.
         relax_limits(flown, self.dt, low)
-        bounds = np.minimum(-self._a_max, flown), np.maximum(self._a_max, flown)
+        a_min, a_max = -self._a_max, self._a_max
+        if self._change is not None:
+            a_min, a_max = self._bound_jerk(self._change, state.before, flown, low[count:])
+        bounds = np.minimum(a_min, flown), np.maximum(a_max, flown)
         problem = _Problem(objective.moving, c, start, flown, state.velocity, planes.normals, low, *bounds)
         return self._by_active_set(problem) or self._by_rows(problem)
+
+    def _bound_jerk(self, change: Array, before: Array, flown: Array, low: Array) -> tuple[Array, Array]:
+        """Write the bounds ``low`` (6n,) of the changes of acceleration; return those of a, (3, n) each.
+
+        ``change`` (3,), m/s²: the largest from step to step; ``before`` (3,): acceleration until the plan
+        begins. A change that the committed accelerations ``flown`` (3, n) exceed is bounded by theirs. The
+        first step has bounds of its acceleration and no row.
+        """
+        changes = np.diff(flown, axis=1, prepend=0.0)
+        bounds = low.reshape(2, 3, self.n)
+        np.minimum(-change[:, None], changes, out=bounds[0])
+        np.minimum(-change[:, None], -changes, out=bounds[1])
+        bounds[:, :, 0] = -np.inf
+        a_min, a_max = -self._a_max, self._a_max.copy()
+        a_min[:, 0] = np.maximum(a_min[:, 0], before - change)
+        a_max[:, 0] = np.minimum(a_max[:, 0], before + change)
+        return a_min, a_max
 
     def _by_active_set(self, problem: _Problem) -> Answer | None:
         """Return the solution of what binds; None if there is none, or if it violates a row or bound."""
@@ -256,15 +284,16 @@ class SeparationQp:
 
     def _of_planes(self, problem: _Problem, of_rows: Array) -> Array:
         """Return the multipliers (M, n, 3) of the planes' rows, of those ``of_rows`` (R,)."""
-        return of_rows[_KINDS * self.n :].reshape(*problem.normals.shape[:2], 3)
+        first = _KINDS * self.n
+        return of_rows[first : first + problem.normals.size].reshape(*problem.normals.shape[:2], 3)
 
 
 class _Problem(NamedTuple):
     """One problem, by axis: c, the best plan without inequalities, and the committed accelerations, (3, n).
 
     ``moving``: whether the destination moves. ``velocity`` (3,); normals (M, n, 3) of the planes; ``low``
-    (R,) of the rows: first those of the limits, then those of the planes; bounds of the accelerations,
-    (3, n).
+    (R,) of the rows: those of the limits, of the planes, and of the jerk, in this order; bounds of the
+    accelerations, (3, n).
     """
 
     moving: bool

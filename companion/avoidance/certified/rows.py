@@ -1,9 +1,10 @@
-"""Rows of the certified QP as kernels, and the active set: limits of speed and position, separating planes.
+"""Rows of the certified QP as kernels, and the active set: limits, separating planes, and bounds on jerk.
 
 Row r = kind·3n + axis·n + step of the limits: the kinds are +v and −v after the step, and the control points
 +q₁, −q₁, +q₂, −q₂ of its segment. The rows of plane m follow, in the order of step and control point: c·q_i,
-with c the plane's normal. A segment begins at q₀ = p with velocity v; q₁ = p + ½ dt v, q₂ =
-p + dt v + ½ dt² a. Accelerations a (3, n) are given by axis.
+with c the plane's normal. Where the jerk is bounded, the last 6n rows are those of a_k − a_{k−1}: first the
+positive ones of each axis and step, then the negative ones; those of k = 0 are a_0. A segment begins at q₀ =
+p with velocity v; q₁ = p + ½ dt v, q₂ = p + dt v + ½ dt² a. Accelerations a (3, n) are given by axis.
 
 ``active_set`` finds what binds by the dual method of D. Goldfarb and A. Idnani ("A numerically stable dual
 method for solving strictly convex quadratic programs", 1983): it begins at the minimiser without
@@ -66,6 +67,14 @@ def _slacks(a: Array, dt: float, normals: Array, low: Array, slack: Array, point
                 q = points[k, i]
                 slack[r] = c[0] * q[0] + c[1] * q[1] + c[2] * q[2] - low[r]
                 r += 1
+    if r < len(low):
+        for axis in range(3):
+            before = 0.0
+            for k in range(n):
+                change, before = a[axis, k] - before, a[axis, k]
+                slack[r] = change - low[r]
+                slack[r + 3 * n] = -change - low[r + 3 * n]
+                r += 1
 
 
 @part
@@ -80,6 +89,14 @@ def _write_row(r: int, S_v: Array, maps: Array, normals: Array, row: Array) -> N
             row[axis, j] = sign * (S_v[k, j] if kind < 2 else maps[kind // 2, k, j])
         return
     r -= 18 * n
+    if r >= normals.size:
+        r -= normals.size
+        axis, k = r % (3 * n) // n, r % n
+        sign = 1.0 if r < 3 * n else -1.0
+        row[axis, k] = sign
+        if k > 0:
+            row[axis, k - 1] = -sign
+        return
     m, k, i = r // (3 * n), r // 3 % n, r % 3
     for axis in range(3):
         for j in range(k + 1):
