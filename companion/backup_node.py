@@ -10,8 +10,9 @@ companion that returns continues the same plan.
 
 The backup node continues only a plan that is known to be flown: the companion's last set-point must agree
 with the plan that the backup node holds, by its own clock and in its own local frame. The backup node must
-start before the companion steers; otherwise it waits for the next plan. The companion's command to land, its
-farewell, another mode, a disarmed vehicle or three seconds without a heartbeat discard all plans.
+start before the companion steers; otherwise it waits for the next plan. It adds to the plan what the
+companion adds (``plan_feedforward``, ``sent_compensation``). The companion's command to land, its farewell,
+another mode, a disarmed vehicle or three seconds without a heartbeat discard all plans.
 """
 
 from __future__ import annotations
@@ -25,15 +26,18 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.avoidance.certified.committed import carried_on, horizon_of, rest_time, rests
 from companion.avoidance.certified.fingerprint import fingerprint
 from companion.config import CompanionConfig
+from companion.errors import CompanionError
 from companion.estimation.origins import Origins
 from companion.flight.autopilots import Profile, is_guided
 from companion.flight.autopilots.known import profile_of
+from companion.flight.plan_feedforward import USUAL_DRAG, Additions, PlanFeedforward
+from companion.flight.sent_compensation import SentCompensation
 from companion.flight.setpoint import setpoint
 from companion.flight.vehicle import HEARTBEAT_LOST
 from companion.goals.heading import Yaw
 from companion.telemetry.sharing import onboard_heartbeat
 from companion.values.components import COMPONENT
-from companion.values.horizon import Horizon
+from companion.values.horizon import Horizon, Motion
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import (
@@ -117,6 +121,7 @@ class BackupNode:
         self._cached_horizon: tuple[WirePlan, Horizon] | None = None
         self._received: tuple[int, SetpointLocal] | None = None
         self._beat: tuple[int, Heartbeat] | None = None
+        self._compensation, self._feedforward = SentCompensation(), PlanFeedforward()
         self._local: LocalFrame | None = None
         self._origins = Origins()
         self._next = self._next_beat = 0
@@ -175,8 +180,18 @@ class BackupNode:
         # The target is not known here, so the yaw stays at the companion's last one.
         yaw = Yaw(self._local.yaw_to_fleet(last.yaw), 0.0, 0.0)
         time = now + self._config.setpoint_lead_us
-        mask = profile.setpoint_mask
-        message = setpoint(time, now - self._boot, horizon, yaw, self._local, self._own, mask)
+        added = self._added(time, horizon.at(time), profile)
+        message = setpoint(
+            time,
+            now - self._boot,
+            horizon,
+            yaw,
+            self._local,
+            self._own,
+            profile.setpoint_mask,
+            added.acceleration,
+            added=added.velocity,
+        )
         return [*beat, Datagram("autopilot", self._codecs["autopilot"].encode(message))]
 
     def farewell(self, now: int) -> list[Message]:
@@ -219,6 +234,7 @@ class BackupNode:
                 self._local = self._fleet.local(message.latitude, message.longitude, message.altitude)
             case SetpointLocal():
                 self._received = (now, message) if self._agrees(now, message) else None
+                self._learn(now, message)
             case CommandLong() if message.command == mavlink.MAV_CMD_NAV_LAND:
                 self._forget()
             case Tunnel():
@@ -270,10 +286,46 @@ class BackupNode:
         # Written so that a NaN does not agree.
         return bool(off @ off <= _MAX_DEVIATION_M**2)
 
+    def _learn(self, now: int, message: SetpointLocal) -> None:
+        """Observe what the companion's set-point, if it agrees with the plan, adds to the acceleration."""
+        profile = self._profile(now)
+        if not self._config.tracking.compensate or self._received is None:
+            return
+        time = now + self._config.setpoint_lead_us
+        horizon = self._horizon(time)
+        if horizon is None or profile is None or self._local is None:
+            return
+        of_plan = self._feedforward.step(time, self._planned, profile.loop, USUAL_DRAG)
+        if profile.loop.inverse is not None:
+            return
+        planned = self._planned(time + profile.loop.lead_us).acceleration + of_plan.acceleration
+        added = self._local.velocity_to_fleet(message.acceleration)[:2] - planned[:2]
+        # Written so that a NaN is not observed. A plan that has not arrived yet makes a larger difference.
+        if added @ added <= self._config.tracking.most**2:
+            self._compensation.observe(now, horizon.at(time).velocity[:2], added)
+
+    def _added(self, time: int, planned: Motion, profile: Profile) -> Additions:
+        """Return what the set-point at ``time`` (µs) adds to the ``planned`` motion, as the companion's."""
+        if not self._config.tracking.compensate:
+            return Additions()
+        loop = profile.loop
+        of_plan = self._feedforward.step(time, self._planned, loop, USUAL_DRAG)
+        ahead = self._planned(time + loop.lead_us).acceleration - planned.acceleration
+        sent = ahead + self._compensation.at(planned.velocity[:2]) + of_plan.acceleration
+        return of_plan._replace(acceleration=sent)
+
+    def _planned(self, time: int) -> Motion:
+        """Return the planned motion at ``time`` (µs); it may be that of the plan to come."""
+        horizon = self._horizon(time)
+        if horizon is None:
+            raise CompanionError("there is no committed plan yet")
+        return horizon.at(time)
+
     def _forget(self) -> None:
         """Discard all plans and the last set-point; nothing is sent until both have been received again."""
         self._plans.clear()
         self._received = None
+        self._compensation, self._feedforward = SentCompensation(), PlanFeedforward()
 
     def _profile(self, now: int) -> Profile | None:
         """Return the autopilot's profile; None unless it is connected, armed and follows set-points."""

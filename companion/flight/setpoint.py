@@ -36,6 +36,7 @@ def setpoint(
     bias: Array = NO_ACCELERATION,
     v_max: Array = UNBOUNDED,
     lead: int = 0,
+    added: Array = NO_ACCELERATION,
 ) -> SetpointLocal:
     """Return SET_POSITION_TARGET_LOCAL_NED in the vehicle's own local frame.
 
@@ -43,7 +44,8 @@ def setpoint(
     ``own`` is the sender, and its system id the target's; ``mask`` is POSITION_TARGET_TYPEMASK.
     ``compensation`` (3,), m/s², fleet-local ENU, is added to the acceleration. ``bias`` (3,), m/s, is added
     to the velocity (see ``tracking.py``); the sum is then clipped on each axis to the larger of ``v_max``
-    (3,) and the planned speed. The acceleration is that of the horizon ``lead`` µs later.
+    (3,) and the planned speed; then ``added`` (3,), m/s, is added (see ``plan_feedforward.py``). The
+    acceleration is that of the horizon ``lead`` µs later.
     """
     motion = horizon.at(time)
     acceleration = horizon.at(time + lead).acceleration if lead else motion.acceleration
@@ -51,6 +53,8 @@ def setpoint(
     if bias is not NO_ACCELERATION:
         most = np.maximum(np.abs(velocity), v_max)
         velocity = np.minimum(np.maximum(velocity + bias, -most), most)
+    if added is not NO_ACCELERATION:
+        velocity = velocity + added
     place, speed, change = local.motion_to_local(motion.position, velocity, acceleration + compensation)
     return SetpointLocal(
         own,

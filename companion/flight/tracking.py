@@ -59,6 +59,11 @@ _ENVELOPE_DECAY_S = 10.0
 """s in which the envelope of the error decays to 1/e."""
 
 
+NO_ADDITION: Array = np.zeros(3)
+"""No addition to the velocity."""
+NO_ADDITION.flags.writeable = False
+
+
 class Errors:
     """Histogram of tracking errors with bins of 1 cm up to 5 m; ``worst``: the largest error, m."""
 
@@ -114,6 +119,8 @@ class Tracking:
         self._last_position: Array = np.zeros(3)
         self._residual: Array = np.zeros(2)
         self._model_acceleration: Array = np.zeros(2)
+        # Integral of the velocity error, where the loop's integral is modelled.
+        self._integral: Array = np.zeros(2)
         # Trajectory that the autopilot follows: rows are position and velocity relative to the reference.
         self._relative: Array = np.zeros((2, 2))
         # Acceleration of this trajectory; for an autopilot without one, the acceleration of the set-point.
@@ -138,6 +145,16 @@ class Tracking:
         It is 0 without compensation or for an unknown autopilot.
         """
         return loop.lead_us if loop is not None and self._config.compensate else 0
+
+    @property
+    def added_velocity(self) -> Array:
+        """Addition (3,), m/s, to the velocity of set-points besides ``bias``."""
+        return NO_ADDITION
+
+    @property
+    def added_acceleration(self) -> Array:
+        """Addition (3,), m/s², to the acceleration of set-points."""
+        return self.compensation
 
     @property
     def excess(self) -> float:
@@ -197,6 +214,9 @@ class Tracking:
         velocity_error = (reference.velocity + self.bias - measured.velocity)[:2] + speed
         velocity_error += loop.position * (position - self.error[:2])
         commanded = self._feedforward + loop.velocity * velocity_error
+        if loop.integral > 0.0:
+            self._integral = self._integral + dt * velocity_error
+            commanded = commanded + loop.integral * self._integral
         share = 1.0 - exp(-dt / config.lag) if config.lag > 0.0 else 1.0
         self._model_acceleration = self._model_acceleration + share * (commanded - self._model_acceleration)
         pole = config.bandwidth

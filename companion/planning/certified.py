@@ -9,12 +9,11 @@ from companion.avoidance.certified.committed import rest_time
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.field.plan_log import PlanLog
 from companion.config import CompanionConfig
-from companion.config.flight import TrackingConfig
 from companion.config.planning import MethodName
 from companion.flight.guard import Holding
 from companion.flight.lowering import Lowered
+from companion.flight.plan_tracking import PlanTracking
 from companion.flight.state_machine import Pilot
-from companion.flight.tracking import Tracking
 from companion.planning.avoidance import AvoidanceInputs, Tally
 from companion.planning.plan_times import PlanTimes
 from companion.values.horizon import Array, Horizon, Motion
@@ -38,8 +37,8 @@ class VehicleParts(NamedTuple):
 class CertifiedAvoidance:
     """``Avoidance`` by the committed plans of one vehicle.
 
-    A committed plan is flown as it is: set-points are not compensated, the limits of plans are not lowered,
-    and no method of the field takes part.
+    A committed plan is flown as it is: the limits of plans are not lowered, and no method of the field takes
+    part. Set-points are compensated as ``tracking`` says; that changes no plan and no distance.
     """
 
     failing: int | None = None
@@ -49,12 +48,13 @@ class CertifiedAvoidance:
         self._config, own, fleet, self._world, self._pilot, self._times = parts
         self._flight = CertifiedFlight(self._config, own, fleet)
         self.lookahead_s = self._flight.lookahead_s
-        self.tracking = Tracking(TrackingConfig(compensate=False, usual=None, alarm=None))
+        self.tracking = PlanTracking(self._config.tracking)
         self.horizon: Horizon | None = None
         self.log = PlanLog()
         self.next_due = 0
         self._plans = 0
         self._finishing = False
+        self._next_observation = 0
 
     @property
     def held(self) -> int:
@@ -97,8 +97,9 @@ class CertifiedAvoidance:
         self.horizon = None
 
     def rest(self) -> None:
-        """Discard the horizon that is flown, because set-points do not steer the vehicle."""
+        """Discard the horizon and the state of tracking, because set-points do not steer the vehicle."""
         self.horizon = None
+        self.tracking.reset()
 
     def finish(self) -> None:
         """Make no further plan: the committed one is flown to its end, and then its last position held."""
@@ -120,6 +121,8 @@ class CertifiedAvoidance:
             flight.stand(now, situation.measured.position)
         if self._pilot.guided and not situation.stale:
             flight.watch(now, situation.measured)
+        if self._config.tracking.compensate:
+            self._observe(now, situation)
         if self._pilot.guided and not self._finishing and flight.due(now):
             self._replan(now, situation)
         self.horizon = horizon = flight.horizon()
@@ -147,6 +150,17 @@ class CertifiedAvoidance:
     def shared(self, now: int, view: View) -> Horizon | None:
         """Return None: committed plans have messages of their own."""
         return None
+
+    def _observe(self, now: int, situation: AvoidanceInputs) -> None:
+        """Update the compensation, once a set-point, with how the vehicle follows the plan."""
+        tracking, horizon, loop = self.tracking, self._flight.horizon(), self._pilot.loop
+        if not self._pilot.guided:
+            tracking.reset()
+        elif situation.stale:
+            tracking.forget()
+        elif horizon is not None and loop is not None and now >= self._next_observation:
+            self._next_observation = now + self._config.rates.setpoint_us
+            tracking.follow(now, horizon, situation.measured, loop)
 
     def _replan(self, now: int, situation: AvoidanceInputs) -> None:
         """Make the next epoch's plan: by solving, from the measured motion, or by carrying the old one on."""

@@ -51,10 +51,11 @@ class Setpoints:
             view.local,
             self._own,
             profile.setpoint_mask,
-            tracking.compensation,
+            tracking.added_acceleration,
             tracking.bias,
             self._planning.fastest,
             tracking.lead(self._pilot.loop),
+            tracking.added_velocity,
         )
         if not is_finite(message):
             # The horizon is discarded, so planning restarts at the measured position.

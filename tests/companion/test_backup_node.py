@@ -14,8 +14,14 @@ from companion.avoidance.certified.fingerprint import fingerprint, identity
 from companion.avoidance.certified.negotiation import Geometry
 from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
+from companion.config.flight import TrackingConfig
+from companion.flight.autopilots import Profile
+from companion.flight.autopilots.ardupilot import ARDUPILOT
+from companion.flight.autopilots.px4 import PX4
+from companion.flight.plan_feedforward import USUAL_DRAG, PlanFeedforward
 from companion.values.components import COMPONENT
-from mavlink_bridge.frames import FleetFrame
+from companion.values.horizon import Array
+from mavlink_bridge.frames import FleetFrame, enu_to_ned
 from mavlink_bridge.key import Key
 from mavlink_bridge.messages import (
     CommandLong,
@@ -47,15 +53,17 @@ YAW = 0.7
 class Bench:
     """A backup node, and a companion that speaks until it is told not to."""
 
-    def __init__(self, key: Key | None = None, companions: Key | None = None) -> None:
+    def __init__(
+        self, key: Key | None = None, companions: Key | None = None, config: CompanionConfig = CONFIG
+    ) -> None:
         """``key``: the backup node's; ``companions``: its companion's, and the autopilot's."""
-        self.node = BackupNode(CONFIG, SYSTEM, FLEET, None if key is None else Signing(key))
+        self.node = BackupNode(config, SYSTEM, FLEET, None if key is None else Signing(key))
         signing = Signing(companions)
         signing.present(BEGIN)
         self.codec, self.reader = Codec(None, signing), Codec()
         self.now = BEGIN
         self.speaks = self.beats = True
-        self.mode, self.armed = mavlink.COPTER_MODE_GUIDED, True
+        self.autopilot, self.mode, self.armed = ARDUPILOT.autopilot, mavlink.COPTER_MODE_GUIDED, True
         self.origin = np.zeros(3)
         """Of the vehicle's local frame, as the backup node hears it; the companion's is the fleet's."""
         self.ahead = 0
@@ -89,7 +97,7 @@ class Bench:
         if self.beats and since % 1_000_000 == 0:
             custom = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
             base = custom | mavlink.MAV_MODE_FLAG_SAFETY_ARMED * self.armed
-            inbox.append(self.tell("autopilot", Heartbeat(AUTOPILOT, 13, 3, base, self.mode, 4)))
+            inbox.append(self.tell("autopilot", Heartbeat(AUTOPILOT, 13, self.autopilot, base, self.mode, 4)))
         if self.speaks and since % 20_000 == 0:
             inbox.append(self.tell("autopilot", self._spoken()))
         if self.speaks and since % 50_000 == 0:
@@ -301,3 +309,60 @@ def test_with_another_key_it_hears_nobody_and_carries_nothing_on():
     bench.run(1.0)
     bench.speaks = False
     assert bench.run(2.0) == []
+
+
+class Compensating(Bench):
+    """The companion adds to its plan what the autopilot needs, and compensates drag and wind."""
+
+    def __init__(self, profile: Profile) -> None:
+        super().__init__(config=CONFIG.model_copy(update={"tracking": TrackingConfig(compensate=True)}))
+        self.profile, self.autopilot, self.mode = profile, profile.autopilot, profile.guided_custom_mode
+        self.feedforward = PlanFeedforward()
+
+    def motion(self, now: int) -> tuple[Array, Array, Array]:
+        """What a companion that goes on sends at ``now`` (µs), fleet-local ENU; call it in their order."""
+        horizon, time, loop = horizon_of(self.plans[0]), now + CONFIG.setpoint_lead_us, self.profile.loop
+        place, velocity, _ = horizon.at(time)
+        added = self.feedforward.step(time, horizon.at, loop, USUAL_DRAG)
+        drag = np.zeros(3) if loop.inverse is not None else [0.8, 0.8, 0.0] * velocity + [0.4, -0.3, 0.0]
+        acceleration = horizon.at(time + loop.lead_us).acceleration
+        return place, velocity + added.velocity, acceleration + added.acceleration + drag
+
+    def _spoken(self) -> SetpointLocal:
+        sent = (tuple(float(one) for one in enu_to_ned(part)) for part in self.motion(self.now))
+        return SetpointLocal(COMPANION, self.now - BEGIN, SYSTEM, 1, 1, 0, *sent, YAW, 0.0)
+
+
+@pytest.mark.parametrize("profile", [ARDUPILOT, PX4], ids=lambda profile: profile.name)
+def test_it_adds_to_the_plan_what_the_companion_adds(profile: Profile) -> None:
+    """The first set-points are those that the companion would have sent, and so are the later ones."""
+    bench = Compensating(profile)
+    assert bench.run(1.0) == []
+    bench.speaks, since = False, bench.now
+    sent = bench.run(2.0)
+    wanted = {now: bench.motion(now) for now in range(since, bench.now, TICK)}
+    plan = horizon_of(bench.plans[0])
+    off, added = [], []
+    for now, message in sent:
+        place, velocity, acceleration = wanted[now]
+        np.testing.assert_allclose(enu_to_ned(place), message.position, atol=1e-4)
+        motion = plan.at(now + CONFIG.setpoint_lead_us)
+        for sent_so, right, plain in (
+            (message.velocity, velocity, motion.velocity),
+            (message.acceleration, acceleration, motion.acceleration),
+        ):
+            off.append(np.abs(enu_to_ned(right) - sent_so).max())
+            added.append(np.abs(right - plain).max())
+    # The drag is known from a second of set-points, and not exactly.
+    assert max(added) > 0.5
+    assert max(off) < 0.25 * max(added)
+
+
+def test_an_acceleration_that_is_no_number_is_not_continued() -> None:
+    bench = Compensating(PX4)
+    spoken = bench._spoken
+    bench._spoken = lambda: spoken()._replace(acceleration=(float("nan"),) * 3)  # type: ignore[method-assign]
+    bench.run(1.0)
+    bench.speaks = False
+    for _, message in bench.run(2.0):
+        assert np.isfinite([*message.position, *message.velocity, *message.acceleration]).all()

@@ -5,14 +5,14 @@ and adds the field to the acceleration. Here every step is weighted (``cost``), 
 linear term −2 Ω_f f·x of every step: it moves the positions within the constraints. A plan that ends at rest
 could not follow a lasting push with its accelerations. The plan ends at rest.
 
-Bounds of acceleration are bounds on variables. Limits of speed and position and the planes are rows Ga ≥ low.
-Rows that hold for all accelerations within their bounds are left out (``rows_within``). ``active_set`` finds
-what binds of the others, about ten of seven hundred. PIQP solves the QP with that in its dual form: with as
-many variables as bind, the multipliers. Its solution is checked against all rows and bounds. Where it
-violates one, or no active set is found, PIQP solves in the accelerations, with the rows that matter: those
-within ``_NEAR`` of the committed plan, or violated by the best plan without rows or by an earlier solution.
-A limit that the committed plan violates is relaxed until the plan satisfies it, so that this plan is feasible
-in every problem.
+Bounds of acceleration are bounds on variables. Limits of speed and position, the planes and bounds on jerk
+are rows Ga ≥ low. Rows that hold for all accelerations within their bounds are left out (``rows_within``).
+``active_set`` finds what binds of the others, about ten of seven hundred. PIQP solves the QP with that in its
+dual form: with as many variables as bind, the multipliers. Its solution is checked against all rows and
+bounds. Where it violates one, or no active set is found, PIQP solves in the accelerations, with the rows that
+matter: those within ``_NEAR`` of the committed plan, or violated by the best plan without rows or by an
+earlier solution. A limit that the committed plan violates is relaxed until the plan satisfies it, so that
+this plan is feasible in every problem.
 """
 
 from __future__ import annotations
@@ -43,8 +43,9 @@ from companion.values.prediction import prediction
 _ROUNDS = 8
 _NEAR = 0.1
 """Distance (m/s, m) of the committed plan within which a row takes part from the first solution on."""
-_LIMITS = 18
-"""Number of rows of the limits in each step: speed, second and third control point, three axes, both ways."""
+_LIMITS = 24
+"""Number of rows of the limits in each step: speed, second and third control point, change of acceleration,
+three axes, both ways."""
 _TOLERANCE = 1e-5
 """Largest violation of a row (m, m/s) that is accepted; much smaller than the planes' margin."""
 _MOST_BINDING = 64
@@ -97,7 +98,9 @@ class Answer(NamedTuple):
 class SeparationQp:
     """Matrices of the QP for ``steps`` accelerations; call ``solve`` for each plan.
 
-    ``planar``: the vertical acceleration is bounded to ±0.01 m/s², so that the height stays.
+    ``planar``: the vertical acceleration is bounded to ±0.01 m/s², so that the height stays. With
+    ``limits.j_max`` the acceleration changes by at most j_max·dt from step to step, from the one before the
+    plan to the rest after its end.
     """
 
     def __init__(
@@ -108,8 +111,10 @@ class SeparationQp:
         S_v, self._S_x, _ = prediction(n, dt)
         self._S_v = np.ascontiguousarray(S_v)
         v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self._S_v, self._S_x))
-        # ``maps[i] @ a``: what accelerations a add to control point i of each segment, and to the velocity.
-        self._maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x, self._S_v])
+        # ``maps[i] @ a``: what accelerations a add to control point i of each segment, to the velocity after
+        # it, and to the change of acceleration before it.
+        changes = np.eye(n) - np.eye(n, k=-1)
+        self._maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x, self._S_v, changes])
         self.costs = {
             moving: cost(config, self._S_x, self._S_v)
             for moving, cost in ((False, arriving), (True, following))
@@ -138,6 +143,7 @@ class SeparationQp:
         if planar:
             # The heights stay almost constant: an interior-point method needs an interior.
             self._a_max[2] = _ROUNDED
+        self._change: Array = np.full(3, np.inf) if limits.j_max is None else dt * np.array(limits.j_max)
         v_max = np.array(limits.v_max)
         self._ranges: Array = np.array([[limits.box_min, limits.box_max], [-v_max, v_max]], dtype=np.float64)
 
@@ -155,8 +161,8 @@ class SeparationQp:
         most = _LIMITS * n + planes.wanted.size
         of, normals, low = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
         # The planes are made so that the committed plan keeps them.
-        known = state.position, state.velocity, self.dt, state.committed, self._ranges
-        known += planes.normals, planes.wanted, self._a_max, a_min, a_max, of, normals, low
+        known = *state[:3], self.dt, state.committed, self._ranges
+        known += planes.normals, planes.wanted, self._a_max, self._change, a_min, a_max, of, normals, low
         count_planes, count = rows_within(*known)
         problem = _Problem(c, start, of[:count], normals[:count], low[:count], a_min, a_max)
         return self._by_active_set(problem, count_planes, cost) or self._by_rows(

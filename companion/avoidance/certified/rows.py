@@ -1,11 +1,12 @@
-"""Rows of the certified QP as kernels, and the active set: limits of speed and position, separating planes.
+"""Rows of the certified QP as kernels, and the active set: limits, separating planes, and bounds on jerk.
 
-A row bounds c·y from below: c (3,) is ± an axis for a limit, the normal for a plane, and y one of four
-results of each step k: number 4k + i for the control point q_i of its segment, 4k + 3 for the velocity after
-it. A segment begins at q₀ = p with velocity v; q₁ = p + ½ dt v, q₂ = p + dt v + ½ dt² a. Accelerations a
-(3, n) are given by axis. What they add to a result does not decrease with any of them; so between two bounds
-of a it is least at the lower one. A row that holds there for every axis holds for all accelerations within
-the bounds and is left out: most limits and half of the planes of near neighbours.
+A row bounds c·y from below: c (3,) is ± an axis for a limit, the normal for a plane, and y one of five
+results of each step k: number 5k + i for the control point q_i of its segment, 5k + 3 for the velocity after
+it, 5k + 4 for the change a_k − a_{k−1} of the acceleration. A segment begins at q₀ = p with velocity v;
+q₁ = p + ½ dt v, q₂ = p + dt v + ½ dt² a. Accelerations a (3, n) are given by axis. What they add to a control
+point or velocity does not decrease with any of them; so between two bounds of a it is least at the lower one.
+A row that holds there for every axis holds for all accelerations within the bounds and is left out: most
+limits and half of the planes of near neighbours.
 
 ``active_set`` finds what binds by the dual method of D. Goldfarb and A. Idnani ("A numerically stable dual
 method for solving strictly convex quadratic programs", 1983): it begins at the minimiser without
@@ -37,16 +38,17 @@ _NEGATIVE = 1e-7
 
 @part
 def _motion(a: Array, more: float, dt: float, results: Array) -> None:
-    """Write the ``results`` (4n, 3) of the motion from rest at 0 with ``more`` than each of ``a``."""
+    """Write the ``results`` (5n, 3) of the motion from rest at 0 with ``more`` than each of ``a``."""
     for axis in range(3):
         p = v = 0.0
         for k in range(a.shape[1]):
-            results[4 * k, axis] = p
-            results[4 * k + 1, axis] = p + 0.5 * dt * v
+            results[5 * k, axis] = p
+            results[5 * k + 1, axis] = p + 0.5 * dt * v
             p += dt * v + 0.5 * dt * dt * (a[axis, k] + more)
-            results[4 * k + 2, axis] = p
+            results[5 * k + 2, axis] = p
             v += dt * (a[axis, k] + more)
-            results[4 * k + 3, axis] = v
+            results[5 * k + 3, axis] = v
+            results[5 * k + 4, axis] = a[axis, k] - (a[axis, k - 1] if k > 0 else 0.0)
 
 
 @part
@@ -59,7 +61,7 @@ def _slack(r: int, of: NDArray[np.int64], c: Array, low: Array, results: Array) 
 @part
 def _write_row(r: int, of: NDArray[np.int64], c: Array, maps: Array, row: Array) -> None:
     """Write row ``r`` of G to ``row`` (3, n)."""
-    i, k = of[r] % 4, of[r] // 4
+    i, k = of[r] % 5, of[r] // 5
     for axis in range(3):
         for j in range(maps.shape[1]):
             row[axis, j] = c[r, axis] * maps[i, k, j]
@@ -67,12 +69,12 @@ def _write_row(r: int, of: NDArray[np.int64], c: Array, maps: Array, row: Array)
 
 @kernel(
     several(2, INT),
-    *[array(1)] * 2,
+    *[array(1)] * 3,
     FLOAT,
     array(2),
     array(3),
     *[array(3)] * 2,
-    array(1),
+    *[array(1)] * 2,
     *[output(2)] * 2,
     output(1, INT),
     output(2),
@@ -81,12 +83,14 @@ def _write_row(r: int, of: NDArray[np.int64], c: Array, maps: Array, row: Array)
 def rows_within(
     position: Array,
     velocity: Array,
+    before: Array,
     dt: float,
     committed: Array,
     ranges: Array,
     normals: Array,
     wanted: Array,
     a_max: Array,
+    change: Array,
     x_min: Array,
     x_max: Array,
     of: NDArray[np.int64],
@@ -96,20 +100,27 @@ def rows_within(
     """Write the bounds of the accelerations, and the rows that some accelerations within them violate.
 
     Returned are the number of rows of planes, which come first, and of all. ``position``, ``velocity`` (3,):
-    the state at the beginning; ``ranges`` (2, 2, 3): least and largest position and velocity; ``a_max`` (3,).
-    A bound or limit that the ``committed`` accelerations (n, 3) violate is relaxed to what they keep.
-    ``normals``, ``wanted`` (M, n, 3): the planes. Written are the bounds ``x_min``, ``x_max`` (3, n), and
-    arrays of length R ≥ 18n + 3nM: row r is ``c``·y ≥ ``low`` with the result y of number ``of``. No input
-    changes the first control point of all; it has no rows.
+    the state at the beginning; ``before`` (3,): the acceleration until then; ``ranges`` (2, 2, 3): least and
+    largest position and velocity; ``a_max`` (3,); ``change`` (3,): largest change of the acceleration from
+    step to step, ∞ for any. A bound or limit that the ``committed`` accelerations (n, 3) violate is relaxed
+    to what they keep. ``normals``, ``wanted`` (M, n, 3): the planes. Written are the bounds ``x_min``,
+    ``x_max`` (3, n), and arrays of length R ≥ 24n + 3nM: row r is ``c``·y ≥ ``low`` with the result y of
+    number ``of``. No input changes the first control point of all; it has no rows. The change at the
+    beginning and the one at the end, to rest, are bounds of the first and the last acceleration.
     """
     n = x_min.shape[1]
-    a, flown = np.empty((3, n)), np.empty((4 * n, 3))
-    lowest, highest = np.empty((4 * n, 3)), np.empty((4 * n, 3))
+    a, flown = np.empty((3, n)), np.empty((5 * n, 3))
+    lowest, highest = np.empty((5 * n, 3)), np.empty((5 * n, 3))
     for axis in range(3):
         for k in range(n):
             a[axis, k] = committed[k, axis]
-            x_min[axis, k] = min(-a_max[axis], committed[k, axis])
-            x_max[axis, k] = max(a_max[axis], committed[k, axis])
+            least, most = -a_max[axis], a_max[axis]
+            if k == 0:
+                least, most = max(least, before[axis] - change[axis]), min(most, before[axis] + change[axis])
+            if k == n - 1:
+                least, most = max(least, -change[axis]), min(most, change[axis])
+            x_min[axis, k] = min(least, committed[k, axis])
+            x_max[axis, k] = max(most, committed[k, axis])
     _motion(a, 0.0, dt, flown)
     _motion(x_min, -BOUND, dt, lowest)
     _motion(x_max, BOUND, dt, highest)
@@ -118,7 +129,7 @@ def rows_within(
         for k in range(n):
             normal = normals[m, k]
             for i in range(3):
-                y = 4 * k + i
+                y = 5 * k + i
                 least, bound = 0.0, wanted[m, k, i]
                 for axis in range(3):
                     free = position[axis] + dt * (k + 0.5 * i) * velocity[axis]
@@ -131,10 +142,10 @@ def rows_within(
                         c[count, axis] = normal[axis]
                     count += 1
     planes = count
-    for y in range(1, 4 * n):
-        k, i = y // 4, y % 4
+    for y in range(1, 5 * n):
+        k, i = y // 5, y % 5
         for axis in range(3):
-            if i == 0:
+            if i in (0, 4):
                 continue
             free = velocity[axis] if i == 3 else position[axis] + dt * (k + 0.5 * i) * velocity[axis]
             above = min(ranges[i // 3, 0, axis] - free, flown[y, axis])
@@ -147,13 +158,22 @@ def rows_within(
                     c[count, 0] = c[count, 1] = c[count, 2] = 0.0
                     c[count, axis] = sign
                     count += 1
+    for axis in range(3):
+        if not np.isfinite(change[axis]):
+            continue
+        for y in range(9, 5 * n, 5):
+            for sign in (1.0, -1.0):
+                of[count], low[count] = y, min(-change[axis], sign * flown[y, axis])
+                c[count, 0] = c[count, 1] = c[count, 2] = 0.0
+                c[count, axis] = sign
+                count += 1
     return planes, count
 
 
 @kernel(VOID, array(2), FLOAT, array(1, INT), array(2), array(1), output(1))
 def row_slacks(a: Array, dt: float, of: NDArray[np.int64], c: Array, low: Array, slack: Array) -> None:
     """Write ``slack`` = G a − ``low`` of all rows for the accelerations ``a`` (3, n), m/s²."""
-    results = np.empty((4 * a.shape[1], 3))
+    results = np.empty((5 * a.shape[1], 3))
     _motion(a, 0.0, dt, results)
     for r in range(len(low)):
         slack[r] = _slack(r, of, c, low, results)
@@ -163,7 +183,7 @@ def row_slacks(a: Array, dt: float, of: NDArray[np.int64], c: Array, low: Array,
 def write_rows(rows: NDArray[np.intp], of: NDArray[np.int64], c: Array, maps: Array, G: Array) -> None:
     """Write the given ``rows`` (R,) to ``G`` (R, 3, n).
 
-    ``maps`` (4, n, n) map accelerations to the control points and velocities of the steps.
+    ``maps`` (5, n, n) map accelerations to the control points, velocities and changes of the steps.
     """
     for k in range(len(rows)):
         _write_row(rows[k], of, c, maps, G[k])
@@ -262,7 +282,7 @@ def active_set(
     ``_MAX_STEPS``.
     """
     n, rows, room = len(H), len(low), len(active)
-    x, results = start.copy(), np.empty((4 * n, 3))
+    x, results = start.copy(), np.empty((5 * n, 3))
     normal_of, gram, L = np.empty((room, 3, n)), np.empty((room, room)), np.empty((room, room))
     multipliers, r, z = np.zeros(room + 1), np.empty(room), np.empty((3, n))
     normal, image = np.empty((3, n)), np.empty((3, n))
@@ -416,7 +436,7 @@ def combine(
                 x[axis, i] += multipliers[k] * images[k, axis, i]
             if active[k] < planes:
                 push[axis] += max(multipliers[k], 0.0) * c[active[k], axis]
-    results = np.empty((4 * n, 3))
+    results = np.empty((5 * n, 3))
     _motion(x, 0.0, dt, results)
     for r in range(len(low)):
         worst = max(worst, -_slack(r, of, c, low, results))

@@ -30,6 +30,16 @@ class Shaping(NamedTuple):
     velocity: float
 
 
+class Inverse(NamedTuple):
+    """Constants of a loop whose set-points are moved aside for the vehicle to be on its plan.
+
+    ``integral`` (1/s²): gain of the integral of the velocity loop; ``lag_us``: lag of the attitude (µs).
+    """
+
+    integral: float
+    lag_us: int
+
+
 class Loop(NamedTuple):
     """Default gains of an autopilot's horizontal position loop.
 
@@ -40,6 +50,10 @@ class Loop(NamedTuple):
     time constant (s) of the estimated velocity offset, which the velocity set-point compensates; 0: no
     compensation. ``lead_us``: lag of the attitude (µs), by which the acceleration of set-points is sent
     ahead. ``pull`` (1/s): rate at which the velocity set-point corrects the position in addition to the loop.
+
+    ``derivative``: gain of the derivative of the measured velocity. ``inverse``: see there; None if additions
+    to the acceleration of set-points take effect as they are. ``integral`` (1/s²): gain of the integral of
+    the velocity error that the observer predicts. These are used with committed plans only.
     """
 
     position: float
@@ -49,6 +63,9 @@ class Loop(NamedTuple):
     offset_s: float = 0.0
     lead_us: int = 0
     pull: float = 0.0
+    derivative: float = 0.0
+    inverse: Inverse | None = None
+    integral: float = 0.0
 
 
 class Profile(NamedTuple):

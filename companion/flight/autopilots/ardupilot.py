@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.flight.autopilots import Loop, Profile, Shaping, Step
+from companion.flight.autopilots import Inverse, Loop, Profile, Shaping, Step
 
 ARDUPILOT = Profile(
     name="ArduPilot",
@@ -26,6 +26,13 @@ ARDUPILOT = Profile(
     hold_name="BRAKE",
     land_modes=frozenset((mavlink.COPTER_MODE_LAND,)),
     # PSC_POSXY_P and PSC_VELXY_P; the slew is low because plans use most of PSC_JERK_XY, 5 m/s³. The
-    # trajectory's gains are the jerk over WPNAV_ACCEL, 2.5 m/s², and half of that.
-    loop=Loop(1.0, 2.0, 1.0, Shaping(jerk=5.0, position=1.0, velocity=2.0)),
+    # trajectory's gains are the jerk over WPNAV_ACCEL, 2.5 m/s², and half of that. The integral is
+    # PSC_VELXY_I; the lag of the attitude is ATC_INPUT_TC, 0.15 s, and that of the rate loop.
+    loop=Loop(
+        1.0,
+        2.0,
+        1.0,
+        Shaping(jerk=5.0, position=1.0, velocity=2.0),
+        inverse=Inverse(integral=1.0, lag_us=180_000),
+    ),
 )

@@ -32,7 +32,7 @@ PX4 = Profile(
     loss_modes=frozenset((_HOLD,)),
     takeoff_modes=frozenset((4 << 16 | 2 << 24,)),
     # MPC_XY_P and MPC_XY_VEL_P_ACC. The position loop has no integral: an error of 0.3 m/s in the estimated
-    # velocity causes a position error of 0.3 m.
-    loop=Loop(0.95, 1.8, 4.0, offset_s=0.5, lead_us=180_000, pull=0.5),
+    # velocity causes a position error of 0.3 m. The derivative is MPC_XY_VEL_D_ACC.
+    loop=Loop(0.95, 1.8, 4.0, offset_s=0.5, lead_us=180_000, pull=0.5, derivative=0.2),
     bytewise=True,
 )

@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from companion.config.planning import LimitsConfig
-from companion.flight.autopilots import Loop, Shaping
+from companion.flight.autopilots import Shaping
 from companion.flight.autopilots.limits import limits_of, stock_parameters
 from companion.flight.lowering import lowered
 from outrider.resources import find
@@ -169,7 +169,9 @@ def test_the_least_that_an_escort_needs_is_enough(flavour):
 def test_the_gains_are_the_vehicles():
     told = {"PSC_POSXY_P": 0.6, "PSC_VELXY_P": 1.5, "PSC_JERK_XY": 2.5, "WPNAV_ACCEL": 200.0}
     found = lowered(SHIPPED, ARDUPILOT, told)
-    assert found.loop == Loop(0.6, 1.5, 0.5 * ARDUPILOT.loop.slew, Shaping(2.5, 0.625, 1.25))
+    assert found.loop == ARDUPILOT.loop._replace(
+        position=0.6, velocity=1.5, slew=0.5 * ARDUPILOT.loop.slew, shaping=Shaping(2.5, 0.625, 1.25)
+    )
     raised = lowered(SHIPPED, ARDUPILOT, {"PSC_JERK_XY": 7.5})
     assert raised.loop == ARDUPILOT.loop._replace(shaping=Shaping(7.5, 1.5, 3.0))
     slow = lowered(SHIPPED, PX4, {"MPC_XY_P": 0.5, "MPC_JERK_MAX": 2.0, "MPC_ACC_HOR": 2.0})

@@ -81,6 +81,37 @@ def test_it_is_the_distance_from_the_set_points(
     assert flat.largest == pytest.approx(math.hypot(*off[:2]), abs=2e-3)
 
 
+def test_set_points_count_for_the_time_that_they_are_sent_ahead(tmp_path: Path) -> None:
+    lead = 0.1
+    ahead: list[tuple[float, Message]] = [(0.02 * k, setpoint(0.02 * k + lead)) for k in range(1000)]
+    path = log(tmp_path / "flight.tlog", ahead + [(0.05 * k, position(0.05 * k)) for k in range(390)])
+    assert tracking_error(path, 1, planar=False, lead=100_000).largest < 2e-3
+    assert tracking_error(path, 1, planar=False).largest > 0.5 * lead * RADIUS * RATE
+
+
+def test_an_acceleration_against_drag_is_none_of_the_motion(tmp_path: Path) -> None:
+    """Nor is a jump of the velocity, where a plan begins anew."""
+
+    def sent(time: float) -> SetpointLocal:
+        _, velocity, acceleration = circle(time)
+        jump = 5.0 if time > 7.0 else 0.0
+        return setpoint(
+            time,
+            acceleration=tuple(2.0 * a for a in acceleration),
+            velocity=(velocity[0] + jump, *velocity[1:]),
+        )
+
+    messages: list[tuple[float, Message]] = [(0.02 * k, sent(0.02 * k)) for k in range(1000)]
+    path = log(tmp_path / "flight.tlog", messages + [(0.05 * k, position(0.05 * k)) for k in range(390)])
+    found = tracking_error(path, 1, planar=False).acceleration
+    assert found <= 2.0 * RADIUS * RATE**2 + 1e-3
+    calm = [one for one in messages if one[0] < 6.9]
+    flown = [(0.05 * k, position(0.05 * k)) for k in range(136)]
+    later = [(7.0 + t, m._replace(velocity=(0.0,) * 3, acceleration=(0.0,) * 3)) for t, m in calm]
+    path = log(tmp_path / "calm.tlog", calm + flown + later + [(7.0 + t, m) for t, m in flown])
+    assert tracking_error(path, 1, planar=False).acceleration == pytest.approx(RADIUS * RATE**2, rel=1e-3)
+
+
 def test_one_excursion_counts_in_full(tmp_path: Path) -> None:
     sent: list[tuple[float, Message]] = [(0.02 * k, setpoint(0.02 * k)) for k in range(1000)]
     times = [0.005 + 0.05 * k for k in range(390)]

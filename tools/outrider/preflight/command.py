@@ -99,7 +99,9 @@ def checked(options: Options) -> Request:
     run = secrets.randbits(32)
     flown = None
     if options.flight is not None:
-        flown = tracking_error(options.flight, config.system, planar=companion.planar)
+        flown = tracking_error(
+            options.flight, config.system, planar=companion.planar, lead=companion.setpoint_lead_us
+        )
     terms = Terms(config.system, companion, config.origin, options.seconds, options.wait, run, flown)
     return Request(terms, endpoints, config.period_us)
 

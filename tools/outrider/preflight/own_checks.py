@@ -64,7 +64,8 @@ def _limits(
 ) -> Iterator[Check]:
     """Compare the limits of committed plans with those of the autopilot.
 
-    They bound acceleration and speed on each axis. They do not bound the jerk, which some firmware does.
+    They bound acceleration and speed on each axis, and with ``limits.j_max`` the jerk, which some firmware
+    bounds.
     """
     limits = config.limits
     planned = limits.model_copy(update={"a_total": max(hypot(*limits.u_max[:2]), limits.u_max[2])})
@@ -79,7 +80,9 @@ def _limits(
             subject, "limits", Result.PASS, "the autopilot can follow speeds and accelerations of plans"
         )
     if jerk:
-        text = f"the autopilot bounds it, plans do not: at most {jerk[0]}; the tube has to cover this"
+        bound = limits.j_max
+        plans = "do not" if bound is None else f"do only to {max(bound[:2]):g} m/s³"
+        text = f"the autopilot bounds it, plans {plans}; set limits.j_max: at most {jerk[0]}"
         yield Check(subject, "jerk", Result.NOTE, text)
 
 

@@ -9,6 +9,7 @@ recorded, so the error is overestimated by the speed times this delay.
 
 from __future__ import annotations
 
+from collections import deque
 from math import hypot
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -25,7 +26,9 @@ from outrider.errors import InputError
 
 _FRESH_US: Final = 200_000
 """Age (µs) of the last set-point up to which the vehicle is assumed to follow it."""
-_LEAST_S: Final = 10.0
+_WINDOW_US: Final = 200_000
+"""Time (µs) over which the set-points' velocities are compared for their acceleration."""
+LEAST_S: Final = 10.0
 """Duration (s) of flight below which a log says nothing."""
 _NO_AUTOPILOT: Final[int] = mavlink.MAV_AUTOPILOT_INVALID
 _POSITION_IGNORED: Final = 0x007
@@ -40,7 +43,7 @@ _IDS: Final = (
 class TrackingError(NamedTuple):
     """``largest`` distance (m) from the set-points in ``seconds`` of flight.
 
-    ``acceleration`` (m/s²): largest horizontal one of the set-points.
+    ``acceleration`` (m/s²): largest horizontal one of the set-points' motion.
     """
 
     largest: float
@@ -48,42 +51,84 @@ class TrackingError(NamedTuple):
     acceleration: float
 
 
-def tracking_error(path: Path, system: int, *, planar: bool) -> TrackingError:
-    """Return the tracking error of the vehicle ``system`` in a log; without heights if ``planar``.
+class TrackingMeter:
+    """Meter of the tracking error of the vehicle ``system``; without heights if ``planar``.
+
+    ``lead`` (µs): ``setpoint_lead_us`` of the companion. Each set-point is the planned motion so much after
+    it was sent.
+    """
+
+    def __init__(self, system: int, *, planar: bool, lead: int = 0) -> None:
+        self._planar, self._lead = planar, lead
+        self._codec = Codec(lambda identifier, sender, _component: identifier in _IDS and sender == system)
+        self._sent: deque[tuple[int, SetpointLocal]] = deque()
+        self._largest = self._acceleration = 0.0
+        self._before: int | None = None
+        self._followed, self._guided = 0, False
+
+    def receive(self, time: int, frame: bytes) -> None:
+        """Receive a ``frame`` that was sent or received at ``time`` (µs)."""
+        for message in self._codec.feed(frame, whole=True):
+            if isinstance(message, Heartbeat):
+                self._guided = _guided(message) if message.autopilot != _NO_AUTOPILOT else self._guided
+            elif isinstance(message, SetpointLocal):
+                if not message.type_mask & _POSITION_IGNORED:
+                    self._add(time, message)
+            elif isinstance(message, LocalPosition) and self._sent:
+                self._compare(time, message)
+
+    @property
+    def result(self) -> TrackingError:
+        """The tracking error so far."""
+        return TrackingError(self._largest, 1e-6 * self._followed, self._acceleration)
+
+    def _add(self, time: int, setpoint: SetpointLocal) -> None:
+        """Add a set-point; its acceleration counts as far as the velocities have changed accordingly.
+
+        Some of the acceleration may compensate drag and wind, and velocities may jump where a plan begins
+        anew.
+        """
+        while len(self._sent) > 1 and time - self._sent[1][0] >= _WINDOW_US:
+            self._sent.popleft()
+        if self._sent and time - self._sent[0][0] >= _WINDOW_US:
+            since, first = self._sent[0]
+            changes = zip(setpoint.velocity[:2], first.velocity[:2], strict=True)
+            changed = hypot(*(_used(new) - _used(old) for new, old in changes)) / (1e-6 * (time - since))
+            asked = hypot(*(_used(a) for a in setpoint.acceleration[:2]))
+            self._acceleration = max(self._acceleration, min(asked, changed))
+        self._sent.append((time, setpoint))
+
+    def _compare(self, time: int, position: LocalPosition) -> None:
+        """Compare a position with the last set-point, while the autopilot follows set-points."""
+        sent, setpoint = self._sent[-1]
+        if not (self._guided and 0 <= time - sent <= _FRESH_US):
+            self._before = None
+            return
+        distance = _distance(setpoint, time - sent - self._lead, position, planar=self._planar)
+        self._largest = max(self._largest, distance)
+        self._followed += 0 if self._before is None else min(max(time - self._before, 0), _FRESH_US)
+        self._before = time
+
+
+def tracking_error(path: Path, system: int, *, planar: bool, lead: int = 0) -> TrackingError:
+    """Return the tracking error of the vehicle ``system`` in a log, see ``TrackingMeter``.
 
     Raises InputError for a log that cannot be read, and for one with less than 10 s of set-points and
     positions of this vehicle.
     """
-    codec = Codec(lambda identifier, sender, _component: identifier in _IDS and sender == system)
-    last: tuple[int, SetpointLocal] | None = None
-    largest = acceleration = 0.0
-    followed, before, guided = 0, None, False
+    meter = TrackingMeter(system, planar=planar, lead=lead)
     try:
         for record in read_tlog(path):
-            for message in codec.feed(record.frame, whole=True):
-                if isinstance(message, Heartbeat):
-                    guided = _guided(message) if message.autopilot != _NO_AUTOPILOT else guided
-                elif isinstance(message, SetpointLocal):
-                    if not message.type_mask & _POSITION_IGNORED:
-                        last = record.time, message
-                        acceleration = max(acceleration, _finite(hypot(*message.acceleration[:2])))
-                elif isinstance(message, LocalPosition) and last is not None:
-                    age = record.time - last[0]
-                    if guided and 0 <= age <= _FRESH_US:
-                        largest = max(largest, _distance(last[1], age, message, planar=planar))
-                        followed += 0 if before is None else min(max(record.time - before, 0), _FRESH_US)
-                        before = record.time
-                    else:
-                        before = None
+            meter.receive(record.time, record.frame)
     except LogError as error:
         raise InputError(f"--flight {error}") from None
-    seconds = 1e-6 * followed
-    if seconds < _LEAST_S:
+    found = meter.result
+    if found.seconds < LEAST_S:
         raise InputError(
-            f"--flight {path}: has {seconds:.0f} s of set-points and positions of vehicle {system}; needed:"
-            f" {_LEAST_S:.0f} s, in the log of a flight of outrider fly with this vehicle"
+            f"--flight {path}: has {found.seconds:.0f} s of set-points and positions of vehicle {system};"
+            f" needed: {LEAST_S:.0f} s, in the log of a flight of outrider fly with this vehicle"
         )
-    return TrackingError(largest, seconds, acceleration)
+    return found
 
 
 def _guided(beat: Heartbeat) -> bool:
@@ -93,13 +138,8 @@ def _guided(beat: Heartbeat) -> bool:
     return profile is not None and armed and is_guided(profile, beat)
 
 
-def _finite(value: float) -> float:
-    """Return ``value``, or 0 for a field that is not used."""
-    return value if value < 1e6 else 0.0
-
-
 def _distance(setpoint: SetpointLocal, age: int, position: LocalPosition, *, planar: bool) -> float:
-    """Return the distance (m) of a position from a set-point that is ``age`` (µs) old."""
+    """Return the distance (m) of a position from a set-point of ``age`` (µs) ago, which may be negative."""
     dt = 1e-6 * age
     where = _moved(setpoint.position, setpoint.velocity, setpoint.acceleration, dt)
     differences = [a - b for a, b in zip(where, position.position_ned, strict=True)]

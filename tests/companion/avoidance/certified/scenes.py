@@ -24,6 +24,10 @@ NARROW = LimitsConfig(
 """Limits that most of the plans here break in several ways."""
 
 
+SMOOTH = LimitsConfig(j_max=(2.0, 4.0, 1.0))
+"""A bound on jerk that most of the plans here break."""
+
+
 class Scene(NamedTuple):
     """What one vehicle has to solve: ``start`` is its committed plan."""
 
@@ -143,7 +147,17 @@ def beyond(scene: Scene, accelerations: Array) -> Array:
             -speeds.ravel() - np.tile(limits.v_max, STEPS),
             (limits.box_min - points[:, 1:]).ravel(),
             (points[:, 1:] - limits.box_max).ravel(),
+            *_jerks(scene, accelerations),
             accelerations.ravel() - np.tile(limits.u_max, STEPS),
             -accelerations.ravel() - np.tile(limits.u_max, STEPS),
         ]
     )
+
+
+def _jerks(scene: Scene, accelerations: Array) -> tuple[Array, ...]:
+    """By how much (k,) each change of acceleration passes its bound; after its end a plan rests."""
+    if scene.limits.j_max is None:
+        return ()
+    changes = np.diff(accelerations, axis=0, prepend=scene.state.before[None], append=0.0)
+    most = 1e-6 * DT * np.array(scene.limits.j_max)
+    return ((changes - most).ravel(), (-changes - most).ravel())

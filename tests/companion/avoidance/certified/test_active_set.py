@@ -56,13 +56,13 @@ def draw(seed: int) -> Qp:
     n, planes = int(rng.integers(2, 13)), int(rng.integers(0, 5))
     S_v, S_x, _ = prediction(n, DT)
     v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (S_v, S_x))
-    maps = np.stack([x, x + 0.5 * DT * v, S_x, S_v])
+    maps = np.stack([x, x + 0.5 * DT * v, S_x, S_v, np.eye(n) - np.eye(n, k=-1)])
     root = rng.normal(size=(n, n))
     inside = rng.normal(size=(3, n))
     # Rows of planes, and limits along an axis, of all results but the first control point.
-    results = np.tile(np.arange(1, 4 * n), 6 + planes)
+    results = np.tile(np.arange(1, 5 * n), 6 + planes)
     normals = rng.normal(size=(len(results), 3))
-    normals[: 6 * (4 * n - 1)] = np.repeat(np.vstack([np.eye(3), -np.eye(3)]), 4 * n - 1, axis=0)
+    normals[: 6 * (5 * n - 1)] = np.repeat(np.vstack([np.eye(3), -np.eye(3)]), 5 * n - 1, axis=0)
     G = np.empty((len(results), 3, n))
     write_rows(np.arange(len(results)), results, normals, maps, G)
     room = rng.uniform(0.01, 0.5) * rng.uniform(0.1, 2.0, len(results))
@@ -102,7 +102,7 @@ def test_what_binds_determines_the_minimiser(seed: int) -> None:
     found = find(qp)
     assert found.size >= 0
     k = found.size
-    multipliers, planes = found.multipliers(k), 6 * (4 * len(qp.one) - 1)
+    multipliers, planes = found.multipliers(k), 6 * (5 * len(qp.one) - 1)
     x, push = np.empty_like(qp.c), np.empty(3)
     rest = DT, *qp[3:], planes
     violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, push)
@@ -120,7 +120,7 @@ def test_another_set_is_not_taken_for_it(seed: int) -> None:
     if found.size < 1:
         return
     k = found.size - 1
-    multipliers, planes = found.multipliers(k), 6 * (4 * len(qp.one) - 1)
+    multipliers, planes = found.multipliers(k), 6 * (5 * len(qp.one) - 1)
     x, push = np.empty_like(qp.c), np.empty(3)
     rest = DT, *qp[3:], planes
     violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, push)

@@ -18,6 +18,7 @@ from companion.values.horizon import Array
 from tests.companion.avoidance.certified.scenes import (
     CONFIG,
     NARROW,
+    SMOOTH,
     WIDE,
     Scene,
     beyond,
@@ -32,7 +33,7 @@ from tests.companion.avoidance.certified.scenes import (
 CLOSE = 1e-5
 """m, m/s, m/s²."""
 seeds = st.integers(0, 2**32 - 1)
-kinds = st.sampled_from([scene, lambda seed: scene(seed, NARROW), jam])
+kinds = st.sampled_from([scene, lambda seed: scene(seed, NARROW), lambda seed: scene(seed, SMOOTH), jam])
 
 
 def solved(s: Scene, which: int = 0) -> Answer:
@@ -108,7 +109,11 @@ def test_of_plans_that_keep_the_same_rows_each_is_the_best_for_its_own_wish(seed
                 assert cost(s, wish, there) >= least * (1.0 - 1e-6) - 1e-6
 
 
-@pytest.mark.parametrize("kind", [scene, lambda seed: scene(seed, NARROW)], ids=["wide", "narrow"])
+@pytest.mark.parametrize(
+    "kind",
+    [scene, lambda seed: scene(seed, NARROW), lambda seed: scene(seed, SMOOTH)],
+    ids=["wide", "narrow", "smooth"],
+)
 def test_another_solver_with_all_rows_finds_the_same_plan(kind: Callable[[int], Scene]) -> None:
     """Of a problem that is written down anew, by what the motion and the settings say."""
     tight = 0
@@ -200,7 +205,7 @@ def room(s: Scene) -> Array:
 
 def test_the_scenes_are_hard_ones() -> None:
     """Some committed plans break what they can; many solutions lean on planes: else the laws are idle."""
-    scenes = [scene(seed, limits) for seed in range(40) for limits in (WIDE, NARROW)]
+    scenes = [scene(seed, limits) for seed in range(40) for limits in (WIDE, NARROW, SMOOTH)]
     assert sum(widened(s).max() > 0.1 for s in scenes) > 30
     assert sum(bool((np.abs(room(s)) < 1e-12).any()) for s in scenes) > 10
     assert sum(np.linalg.norm(solved(s).push) > 1e-3 for s in scenes) > 30

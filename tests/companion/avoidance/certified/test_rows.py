@@ -18,25 +18,29 @@ draws = given(st.integers(0, 2**32 - 1), st.integers(2, 16), st.integers(0, 4), 
 
 
 class Drawn(NamedTuple):
-    """State, committed accelerations, limits and planes; ``all`` (R,): what the motion leaves of each row."""
+    """State, committed accelerations, limits and planes."""
 
     position: Array
     velocity: Array
+    before: Array
     committed: Array
     ranges: Array
     normals: Array
     wanted: Array
     a_max: Array
+    change: Array
 
     def slack(self, a: Array) -> Array:
         """Slack (R,) of all rows, by the motion with accelerations (n, 3) itself."""
         moved, relaxed = self._moved(a), self._moved(self.committed)
         points, speeds = moved
+        changes = -self.change, self.change
         limits = []
         for part, (least, most), there in (
             (speeds, self.ranges[1], relaxed[1]),
             (points[:, 1], self.ranges[0], relaxed[0][:, 1]),
             (points[:, 2], self.ranges[0], relaxed[0][:, 2]),
+            (np.diff(a, axis=0), changes, np.diff(self.committed, axis=0)),
         ):
             limits += [part - np.minimum(least, there), np.maximum(most, there) - part]
         planes = np.einsum("mnk,nik->mni", self.normals, points) - self.wanted
@@ -65,15 +69,17 @@ def draw(seed: int, n: int, count: int, size: float) -> Drawn:
     rng = np.random.default_rng(seed)
     ranges = np.sort(size * rng.normal(size=(2, 2, 3)), axis=1)
     normals, wanted = rng.normal(size=(2, count, n, 3))
-    state = rng.normal(size=(2, 3))
-    return Drawn(*state, rng.normal(size=(n, 3)), ranges, normals, size * wanted, rng.uniform(0.1, 2.0, 3))
+    state, committed = rng.normal(size=(3, 3)), rng.normal(size=(n, 3))
+    a_max, change = rng.uniform(0.1, 2.0, (2, 3))
+    change[rng.uniform(size=3) < 0.5] = np.inf
+    return Drawn(*state, committed, ranges, normals, size * wanted, a_max, change)
 
 
 def written(drawn: Drawn) -> Rows:
     n = len(drawn.committed)
-    most, bounds = 18 * n + drawn.wanted.size, np.empty((2, 3, n))
+    most, bounds = 24 * n + drawn.wanted.size, np.empty((2, 3, n))
     rows = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
-    planes, count = rows_within(drawn.position, drawn.velocity, DT, *drawn[2:], bounds[0], bounds[1], *rows)
+    planes, count = rows_within(*drawn[:3], DT, *drawn[3:], bounds[0], bounds[1], *rows)
     of, c, low = (part[:count] for part in rows)
     return Rows(planes, of, c, low, *bounds)
 
@@ -88,7 +94,8 @@ def test_slacks_are_those_of_the_motion_and_of_the_matrix(seed: int, n: int, cou
     S_v, S_x, _ = prediction(n, DT)
     v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (S_v, S_x))
     G = np.empty((len(rows.low), 3, n))
-    write_rows(np.arange(len(rows.low)), rows.of, rows.c, np.stack([x, x + 0.5 * DT * v, S_x, S_v]), G)
+    maps = np.stack([x, x + 0.5 * DT * v, S_x, S_v, np.eye(n) - np.eye(n, k=-1)])
+    write_rows(np.arange(len(rows.low)), rows.of, rows.c, maps, G)
     np.testing.assert_allclose(np.einsum("rij,ji->r", G, a) - rows.low, slack, rtol=0.0, atol=1e-10)
     every = drawn.slack(a)
     for one in slack:
@@ -105,8 +112,12 @@ def test_what_is_left_out_holds_for_all_accelerations_within_their_bounds(
     """Each row of the motion is written, or the plan that is worst for it keeps it."""
     drawn = draw(seed, n, count, size)
     rows, rng = written(drawn), np.random.default_rng(seed + 1)
-    np.testing.assert_array_equal(rows.x_min.T, np.minimum(-drawn.a_max, drawn.committed))
-    np.testing.assert_array_equal(rows.x_max.T, np.maximum(drawn.a_max, drawn.committed))
+    middle = np.zeros((n, 3))
+    middle[0] = drawn.before
+    for side, bound in ((-1.0, rows.x_min.T), (1.0, rows.x_max.T)):
+        most = np.tile(drawn.a_max, (n, 1))
+        most[[0, -1]] = np.minimum(most[[0, -1]], side * middle[[0, -1]] + drawn.change)
+        np.testing.assert_array_equal(side * bound, np.maximum(most, side * drawn.committed))
     for _ in range(20):
         # Corners of the bounds are the worst; what a dual solution may violate them by counts, too.
         upper = rng.uniform(size=(n, 3)) < rng.uniform()
