@@ -9,6 +9,9 @@ from typing import Any, Final
 
 import yaml
 
+from companion.avoidance.certified.margins import between
+from companion.config import CompanionConfig
+from trials.autopilots import Autopilot
 from trials.plan import FLAVOURS, TARGET
 
 MIXED: Final = "mixed"
@@ -17,6 +20,10 @@ PROCESSES: Final = ("companion", "parent", "backup node")
 """Processes of ``outrider fly`` that may be killed or stopped."""
 SPACING: Final = 6.0
 """Distance between two vehicles at the start (m)."""
+TUBE: Final = 1.0
+"""Largest tracking error that plans allow for by default (m)."""
+SIGMA: Final = 0.02
+"""Standard deviation of the position estimates by default (m)."""
 STOP_S: Final = 3.0
 """Time for which a process is stopped (s)."""
 _ORIGIN: Final = {"latitude": 47.397742, "longitude": 8.545594, "altitude": 488.0}
@@ -27,8 +34,8 @@ _HEIGHT: Final = 6.0
 class CertifiedPlan:
     """Trial of ``count`` vehicles of ``kind`` that swap places; all random choices follow from ``seed``.
 
-    ``victims``: kinds of processes that may be killed or stopped. ``offset_ms``, ``drift_ppm``: bounds of the
-    errors of the companions' clocks.
+    ``victims``: kinds of processes of which one is killed and one stopped. ``offset_ms``, ``drift_ppm``:
+    bounds of the errors of the companions' clocks.
     """
 
     kind: str = FLAVOURS[0]
@@ -38,11 +45,18 @@ class CertifiedPlan:
     offset_ms: float = 5000.0
     drift_ppm: float = 50.0
     victims: tuple[str, ...] = PROCESSES
+    """Empty: nothing happens to any process."""
     seconds: float = 45.0
     """Time from the first goals to the end (s)."""
     d_min: float = 0.5
+    tube: float = TUBE
+    """Largest tracking error that the plans allow for (m)."""
+    position_sigma: float = SIGMA
+    """Standard deviation of the position estimates (m)."""
     signed: bool = False
     """Whether all links are signed with one key."""
+    autopilots: tuple[Autopilot, ...] = ()
+    """Simulations of real firmware that fly instead of ``count`` emulated vehicles of ``kind``."""
     random: Random = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -51,7 +65,22 @@ class CertifiedPlan:
     @property
     def systems(self) -> range:
         """System ids of the vehicles."""
-        return range(1, self.count + 1)
+        return range(1, len(self.autopilots or (None,) * self.count) + 1)
+
+    @property
+    def name(self) -> str:
+        """Kind of the vehicles."""
+        if not self.autopilots:
+            return self.kind
+        kinds = {one.flavour for one in self.autopilots}
+        return f"real-{min(kinds) if len(kinds) == 1 else MIXED}"
+
+    @property
+    def distance(self) -> float:
+        """Least distance between two plans (m)."""
+        document = self.document(self.systems[0], Random(0))
+        config = CompanionConfig.model_validate(document["companion"])
+        return between(config.certified, config.field, config.limits)
 
     @property
     def origin(self) -> dict[str, float]:
@@ -60,6 +89,8 @@ class CertifiedPlan:
 
     def flavour_of(self, system: int) -> str:
         """Return the flavour of that vehicle's autopilot."""
+        if self.autopilots:
+            return self.autopilots[system - 1].flavour
         return FLAVOURS[system % 2] if self.kind == MIXED else self.kind
 
     def start(self, system: int) -> tuple[float, float, float]:
@@ -68,7 +99,7 @@ class CertifiedPlan:
 
     def goal(self, system: int, turn: int) -> tuple[float, float, float]:
         """Return its goal in ``turn`` 0, 1, …: the mirrored place of the row, and back, further north."""
-        other = self.count + 1 - system if turn % 2 == 0 else system
+        other = len(self.systems) + 1 - system if turn % 2 == 0 else system
         return (SPACING * (other - 1), 3.0 * (turn + 1), _HEIGHT)
 
     def document(self, system: int, random: Random) -> dict[str, Any]:
@@ -77,7 +108,7 @@ class CertifiedPlan:
             "offset_ms": round(random.uniform(-self.offset_ms, self.offset_ms), 3),
             "drift_ppm": round(random.uniform(-self.drift_ppm, self.drift_ppm), 3),
         }
-        width = SPACING * self.count
+        width = SPACING * len(self.systems)
         return {
             "system": system,
             "target": TARGET,
@@ -95,13 +126,13 @@ class CertifiedPlan:
                     "box_min": [-width, -width, 2.5],
                     "box_max": [2 * width, 2 * width, 30.0],
                 },
-                "field": {"d_min": self.d_min, "position_sigma": 0.02},
+                "field": {"d_min": self.d_min, "position_sigma": self.position_sigma},
                 "guard": {"fence_radius": 200.0, "fence_height": 50.0, "tube": 3.0},
                 "certified": {
                     "fleet": list(self.systems),
                     "fleet_time": "measured",
                     "clock_us": 40_000,
-                    "tube": 1.0,
+                    "tube": self.tube,
                     "time_sources": {"reference": 1},
                 },
                 "rates": {"setpoint_us": 40_000},

@@ -39,12 +39,49 @@ class Flown(NamedTuple):
     reported: Track
 
 
+class _Rows(NamedTuple):
+    """Rows of a log, each with its time by the companion's clock (s) in the first column.
+
+    ``sent``: set-points; ``told``: reported positions, both in the vehicle's frame ``local``. ``ties``: time
+    stamps of the target (µs).
+    """
+
+    sent: list[tuple[float, ...]]
+    told: list[tuple[float, ...]]
+    ties: list[tuple[float, float]]
+    local: LocalFrame
+
+
 def flown(path: Path, system: int, fleet: FleetFrame, seconds: Callable[[Array], Array]) -> Flown | None:
     """Return the flight in the log at ``path`` of the companion of ``system``; None without set-points.
 
     The target's time stamps relate the companion's clock to the trial's: ``seconds`` converts times since the
     target's boot (µs) to times of the trial (s).
     """
+    rows = _rows(path, system, fleet)
+    if rows is None or len(rows.ties) < 2:
+        return None
+    tied = np.array(rows.ties, dtype=np.float64)
+    tied[:, 1] = seconds(tied[:, 1])
+    return _flown(rows, tied)
+
+
+def flown_by_clock(
+    path: Path, system: int, fleet: FleetFrame, seconds: Callable[[Array], Array]
+) -> Flown | None:
+    """Return the flight in the log at ``path`` of the companion of ``system``; None without set-points.
+
+    ``seconds`` converts times of the companion's clock (s) to times of the trial (s), linearly.
+    """
+    rows = _rows(path, system, fleet)
+    if rows is None or not rows.told:
+        return None
+    ends = np.array([rows.told[0][0], rows.told[-1][0]])
+    return _flown(rows, np.column_stack([ends, seconds(ends)]))
+
+
+def _rows(path: Path, system: int, fleet: FleetFrame) -> _Rows | None:
+    """Return the rows of a log; None if the origin of the vehicle's frame is not in it."""
     codec = Codec(lambda identifier, _system, _component: identifier in _READ)
     sent: list[tuple[float, ...]] = []
     told: list[tuple[float, ...]] = []
@@ -62,11 +99,12 @@ def flown(path: Path, system: int, fleet: FleetFrame, seconds: Callable[[Array],
                 local = fleet.local(message.latitude, message.longitude, message.altitude)
             elif isinstance(message, GlobalPosition) and message.source.system == TARGET:
                 ties.append((at, message.time_boot))
-    if local is None or len(ties) < 2:
-        return None
-    tied = np.array(ties, dtype=np.float64)
-    tied[:, 1] = seconds(tied[:, 1])
-    rows, places = _between(sent, tied), _between(told, tied)
+    return None if local is None else _Rows(sent, told, ties, local)
+
+
+def _flown(found: _Rows, tied: Array) -> Flown | None:
+    """Return the flight on the trial's time; ``tied`` (n, 2): times of the companion and of the trial (s)."""
+    rows, places, local = _between(found.sent, tied), _between(found.told, tied), found.local
     if not len(rows) or not len(places):
         return None
     setpoints = Setpoints(
