@@ -24,12 +24,15 @@ from outrider.runs.directories import new_directory
 from outrider.terminal.lines import say
 from trials.autopilots import autopilots
 from trials.certified_flight import CertifiedFlight
-from trials.certified_plan import KINDS, PROCESSES, SIGMA, SPACING, TUBE, CertifiedPlan
+from trials.certified_plan import KINDS, PROCESSES, SIGMA, TUBE, CertifiedPlan
 from trials.certified_tracking import certified_tracking, logs_of
 from trials.separation import blind, longest_gap, nearest
 
 GOES_ON_M: Final = 3.0
 """Distance (m) that each other vehicle has flown at least after a process was killed or stopped."""
+
+
+SENSORS: Final = ("truth", "rtk", "gnss", "sih")
 
 
 def flown(plan: CertifiedPlan, directory: Path) -> dict[str, Any]:
@@ -95,26 +98,21 @@ def planned(asked: argparse.Namespace) -> list[CertifiedPlan]:
     flown = autopilots(asked.autopilots) if asked.autopilots else ()
     if flown and asked.signed:
         raise InputError("--signed: real firmware has no key of the trial; sign the emulation's links")
-    found = [
+    return [
         CertifiedPlan(
             asked.kind,
             asked.count,
             seed,
             asked.loss,
             victims=tuple(asked.victims),
-            tube=TUBE if asked.tube is None else asked.tube,
-            position_sigma=SIGMA if asked.sigma is None else asked.sigma,
+            tube=asked.tube,
+            position_sigma=asked.sigma,
+            sensors=asked.sensors,
             signed=asked.signed,
             autopilots=flown,
         )
         for seed in range(asked.seed, asked.seed + asked.flights)
     ]
-    if not found[0].distance < SPACING:
-        raise InputError(
-            f"--tube, --sigma: plans have to be {found[0].distance:.2f} m apart, and vehicles start"
-            f" {SPACING:g} m apart"
-        )
-    return found
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -133,8 +131,14 @@ def main(words: Sequence[str] | None = None) -> int:
         default=list(PROCESSES),
         help="none: nothing happens to any",
     )
-    parser.add_argument("--tube", type=float, help="largest tracking error that plans allow for (1 m)")
-    parser.add_argument("--sigma", type=float, help="standard deviation of the position estimates (0.02 m)")
+    parser.add_argument("--tube", type=float, default=TUBE, help="largest tracking error allowed for, m")
+    parser.add_argument("--sigma", type=float, default=SIGMA, help="σ of the position estimates, m")
+    parser.add_argument(
+        "--sensors",
+        choices=SENSORS,
+        default=SENSORS[0],
+        help="error of emulated estimates; reported positions are judged",
+    )
     parser.add_argument(
         "--autopilots",
         action="append",

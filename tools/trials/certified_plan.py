@@ -10,7 +10,8 @@ from typing import Any, Final
 import yaml
 
 from companion.avoidance.certified.margins import between
-from companion.config import CompanionConfig
+from companion.config.certified import CertifiedConfig
+from companion.config.planning import FieldConfig, LimitsConfig
 from trials.autopilots import Autopilot
 from trials.plan import FLAVOURS, TARGET
 
@@ -19,7 +20,7 @@ KINDS: Final = (*FLAVOURS, MIXED)
 PROCESSES: Final = ("companion", "parent", "backup node")
 """Processes of ``outrider fly`` that may be killed or stopped."""
 SPACING: Final = 6.0
-"""Distance between two vehicles at the start (m)."""
+"""Distance between two vehicles at the start (m), if plans may be a metre nearer."""
 TUBE: Final = 1.0
 """Largest tracking error that plans allow for by default (m)."""
 SIGMA: Final = 0.02
@@ -28,6 +29,8 @@ STOP_S: Final = 3.0
 """Time for which a process is stopped (s)."""
 _ORIGIN: Final = {"latitude": 47.397742, "longitude": 8.545594, "altitude": 488.0}
 _HEIGHT: Final = 6.0
+_V_MAX: Final = (2.0, 2.0, 1.0)
+_CLOCK_US: Final = 40_000
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,8 @@ class CertifiedPlan:
     """Standard deviation of the position estimates (m)."""
     signed: bool = False
     """Whether all links are signed with one key."""
+    sensors: str = "truth"
+    """Error of the position estimates of emulated vehicles; their reported positions are judged."""
     autopilots: tuple[Autopilot, ...] = ()
     """Simulations of real firmware that fly instead of ``count`` emulated vehicles of ``kind``."""
     random: Random = field(init=False, compare=False, repr=False)
@@ -78,9 +83,16 @@ class CertifiedPlan:
     @property
     def distance(self) -> float:
         """Least distance between two plans (m)."""
-        document = self.document(self.systems[0], Random(0))
-        config = CompanionConfig.model_validate(document["companion"])
-        return between(config.certified, config.field, config.limits)
+        return between(
+            CertifiedConfig(tube=self.tube, clock_us=_CLOCK_US),
+            FieldConfig(d_min=self.d_min, position_sigma=self.position_sigma),
+            LimitsConfig(v_max=_V_MAX),
+        )
+
+    @property
+    def spacing(self) -> float:
+        """Distance between two vehicles at the start, and between two goals (m)."""
+        return max(SPACING, self.distance + 1.0)
 
     @property
     def origin(self) -> dict[str, float]:
@@ -95,20 +107,20 @@ class CertifiedPlan:
 
     def start(self, system: int) -> tuple[float, float, float]:
         """Return the place at which that vehicle flies first: east, north, up (m)."""
-        return (SPACING * (system - 1), 0.0, _HEIGHT)
+        return (self.spacing * (system - 1), 0.0, _HEIGHT)
 
     def goal(self, system: int, turn: int) -> tuple[float, float, float]:
         """Return its goal in ``turn`` 0, 1, …: the mirrored place of the row, and back, further north."""
         other = len(self.systems) + 1 - system if turn % 2 == 0 else system
-        return (SPACING * (other - 1), 3.0 * (turn + 1), _HEIGHT)
+        return (self.spacing * (other - 1), 3.0 * (turn + 1), _HEIGHT)
 
     def document(self, system: int, random: Random) -> dict[str, Any]:
         """Return the companion's file of that vehicle, with a clock drawn from ``random``."""
+        width = self.spacing * len(self.systems)
         error = {
             "offset_ms": round(random.uniform(-self.offset_ms, self.offset_ms), 3),
             "drift_ppm": round(random.uniform(-self.drift_ppm, self.drift_ppm), 3),
         }
-        width = SPACING * len(self.systems)
         return {
             "system": system,
             "target": TARGET,
@@ -122,7 +134,7 @@ class CertifiedPlan:
                 "avoidance": "certified",
                 "limits": {
                     "u_max": [1.5, 1.5, 1.0],
-                    "v_max": [2.0, 2.0, 1.0],
+                    "v_max": list(_V_MAX),
                     "box_min": [-width, -width, 2.5],
                     "box_max": [2 * width, 2 * width, 30.0],
                 },
@@ -131,7 +143,7 @@ class CertifiedPlan:
                 "certified": {
                     "fleet": list(self.systems),
                     "fleet_time": "measured",
-                    "clock_us": 40_000,
+                    "clock_us": _CLOCK_US,
                     "tube": self.tube,
                     "time_sources": {"reference": 1},
                 },

@@ -18,7 +18,7 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.wire.signing import Signing
 from outrider.errors import OutriderError
 from trials.arrivals import Arrivals
-from trials.certified_plan import SPACING, CertifiedPlan
+from trials.certified_plan import CertifiedPlan
 from trials.emulation import free_base
 from trials.separation import Track
 from trials.station import listener
@@ -87,12 +87,12 @@ def certified_vehicles(
     ``options``: those of ``outrider sitl`` for links that are signed by ``signing``.
     """
     if plan.autopilots:
-        return Real(dict(zip(plan.systems, plan.autopilots, strict=True)), fleet, directory, SPACING)
+        return Real(dict(zip(plan.systems, plan.autopilots, strict=True)), fleet, directory, plan.spacing)
     return EmulatedWithObserver(plan, fleet, directory, signing, options)
 
 
 class EmulatedWithObserver:
-    """Emulated vehicles, whose reported positions are true ones."""
+    """Emulated vehicles, judged by their reported positions: true ones, unless the plan has sensors."""
 
     def __init__(
         self,
@@ -138,12 +138,13 @@ class SeparateVehicles:
         self._endpoints: dict[int, str] = {}
         for system in plan.systems:
             flavour = plan.flavour_of(system)
-            latitude, longitude, altitude = frame.to_geodetic((SPACING * (system - 1), 0.0, 0.0))
+            latitude, longitude, altitude = frame.to_geodetic((plan.spacing * (system - 1), 0.0, 0.0))
             command = [sys.executable, "-m", "outrider", "sitl", "--json", f"--flavour={flavour}"]
             command += [f"--first-id={system}", f"--port-base={free_base(flavour, 1)}", f"--to={receiver}"]
             command += [
                 f"--origin={latitude:.9f},{longitude:.9f},{altitude:.3f}",
                 "--response=firmware",
+                f"--sensors={plan.sensors}",
                 *signing,
             ]
             with (directory / f"sitl-{system}.log").open("wb") as err:
