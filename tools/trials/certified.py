@@ -78,7 +78,7 @@ def flown(plan: CertifiedPlan, directory: Path) -> dict[str, Any]:
                 logs_of(directory, system),
                 system,
                 flight.fleet,
-                tracks.get(system),
+                tracks.get(system) if plan.autopilots else None,
                 partial(flight.seconds, system),
                 flight.steered(system),
             ).document

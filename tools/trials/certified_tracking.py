@@ -47,8 +47,9 @@ def certified_tracking(
 ) -> CertifiedTracking:
     """Return the largest distances of ``system`` in the ``logs`` of its companion.
 
-    ``truth``: true positions by the trial's time; ``seconds`` converts times of the companion's clock (s) to
-    it. True positions count while the companion ``steered``, from and until these times (s).
+    ``truth``: true positions by the trial's time, None if they are those that the vehicle reports;
+    ``seconds`` converts times of the companion's clock (s) to it. True positions count while the companion
+    ``steered``, from and until these times (s).
     """
     errors = []
     for log in logs:
