@@ -38,8 +38,11 @@ def place(t):
     return np.array([1.0 * t, 2.0, 5.0])
 
 
-def written(path: Path, off) -> Path:
-    """Set-points and reported positions, which are ``off`` (m, ENU) from them."""
+def written(path: Path, off, *, hung: bool = False) -> Path:
+    """Set-points and reported positions, which are ``off`` (m, ENU) from them.
+
+    A companion that ``hung`` for 3 s reads the positions of that time together.
+    """
     local = FLEET.local(*ORIGIN)
     codec = Codec()
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -53,11 +56,23 @@ def written(path: Path, off) -> Path:
         note(0.0, GpsGlobalOrigin(AUTOPILOT, *ORIGIN, 0))
         for k in range(round(25 * SECONDS)):
             t = 0.04 * k
+            if hung and 8.0 <= t < 11.0:
+                continue
             goal = tuple(local.position_to_local(place(t)).tolist())
             here = tuple(local.position_to_local(place(t) + np.array(off)).tolist())
             note(t, SetpointLocal(OWN, 0, 3, 1, 1, 0, goal, velocity, (0.0, 0.0, 0.0), 0.0, 0.0))
             note(t, LocalPosition(AUTOPILOT, round(1e6 * t), here, velocity))
+            if hung and t == 11.0:
+                for late in np.arange(8.0, 11.0, 0.04):
+                    there = tuple(local.position_to_local(place(late) + np.array(off)).tolist())
+                    note(t, LocalPosition(AUTOPILOT, round(1e6 * late), there, velocity))
     return path
+
+
+def test_positions_that_were_read_late_say_nothing_of_the_estimate(tmp_path) -> None:
+    log = written(tmp_path / "vehicle-3.tlog", (0.0, 0.0, 0.2), hung=True)
+    found = certified_tracking([log], 3, FLEET, truth((0.0, 0.0, 0.0)), seconds, ALWAYS)
+    assert found.estimate == pytest.approx(0.2, abs=0.12)
 
 
 def truth(off) -> Track:

@@ -26,7 +26,7 @@ from trials.autopilots import autopilots
 from trials.certified_flight import CertifiedFlight
 from trials.certified_plan import KINDS, PROCESSES, SIGMA, TUBE, CertifiedPlan
 from trials.certified_tracking import certified_tracking, logs_of
-from trials.separation import blind, longest_gap, nearest
+from trials.separation import blind, longest_gap, nearest, save
 
 GOES_ON_M: Final = 3.0
 """Distance (m) that each other vehicle has flown at least after a process was killed or stopped."""
@@ -47,6 +47,7 @@ def flown(plan: CertifiedPlan, directory: Path) -> dict[str, Any]:
         flight.close()
     faults = [trouble] if trouble else []
     tracks = flight.observer.tracks()
+    save(tracks, directory)
     found = nearest(tracks) if tracks else []
     least = min(found, key=lambda one: one.distance, default=None)
     if least is None or len(tracks) < len(plan.systems):

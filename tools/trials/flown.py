@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,11 @@ _READ = frozenset(
     )
 )
 
+_NEAR_S: Final = 5.0
+"""Time (s) within which the fastest message shows the delay of the link."""
+_LATE_S: Final = 0.1
+"""Further delay (s) above which a position was read late."""
+
 
 class Flown(NamedTuple):
     """Flight on the trial's time.
@@ -42,8 +47,8 @@ class Flown(NamedTuple):
 class _Rows(NamedTuple):
     """Rows of a log, each with its time by the companion's clock (s) in the first column.
 
-    ``sent``: set-points; ``told``: reported positions, both in the vehicle's frame ``local``. ``ties``: time
-    stamps of the target (µs).
+    ``sent``: set-points; ``told``: reported positions, after their time stamps (s); both in the vehicle's
+    frame ``local``. ``ties``: time stamps of the target (µs).
     """
 
     sent: list[tuple[float, ...]]
@@ -71,13 +76,27 @@ def flown_by_clock(
 ) -> Flown | None:
     """Return the flight in the log at ``path`` of the companion of ``system``; None without set-points.
 
-    ``seconds`` converts times of the companion's clock (s) to times of the trial (s), linearly.
+    ``seconds`` converts times of the companion's clock (s) to times of the trial (s), linearly. Positions
+    that a companion which hung has read late are left out.
     """
     rows = _rows(path, system, fleet)
     if rows is None or not rows.told:
         return None
     ends = np.array([rows.told[0][0], rows.told[-1][0]])
-    return _flown(rows, np.column_stack([ends, seconds(ends)]))
+    return _flown(rows._replace(told=_prompt(rows.told)), np.column_stack([ends, seconds(ends)]))
+
+
+def _prompt(told: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    """Return the rows whose time is within ``_LATE_S`` of their time stamp, as of the fastest near it."""
+    times = np.array([row[0] for row in told])
+    delays = times - np.array([row[1] for row in told])
+    begins = np.searchsorted(times, times - _NEAR_S)
+    ends = np.searchsorted(times, times + _NEAR_S, side="right")
+    return [
+        row
+        for row, delay, begin, end in zip(told, delays, begins, ends, strict=True)
+        if delay - delays[begin:end].min() <= _LATE_S
+    ]
 
 
 def _rows(path: Path, system: int, fleet: FleetFrame) -> _Rows | None:
@@ -94,7 +113,7 @@ def _rows(path: Path, system: int, fleet: FleetFrame) -> _Rows | None:
             if isinstance(message, SetpointLocal) and own:
                 sent.append((at, *message.position, *message.velocity, *message.acceleration))
             elif isinstance(message, LocalPosition) and own:
-                told.append((at, *message.position_ned))
+                told.append((at, 1e-6 * message.time_boot, *message.position_ned))
             elif isinstance(message, GpsGlobalOrigin) and own:
                 local = fleet.local(message.latitude, message.longitude, message.altitude)
             elif isinstance(message, GlobalPosition) and message.source.system == TARGET:
@@ -116,7 +135,7 @@ def _flown(found: _Rows, tied: Array) -> Flown | None:
     )
     times = np.interp(places[:, 0], *tied.T)
     known = np.ones(len(times), dtype=bool)
-    return Flown(setpoints, Track(times, local.position_to_fleet(places[:, 1:]), known))
+    return Flown(setpoints, Track(times, local.position_to_fleet(places[:, 2:]), known))
 
 
 def _between(rows: list[tuple[float, ...]], tied: Array) -> Array:

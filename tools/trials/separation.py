@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from itertools import combinations
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +74,16 @@ def nearest(
             k = int(np.nanargmin(off))
             found.append(Nearest((pair[0], pair[1]), float(off[k]), float(times[k])))
     return found
+
+
+def save(tracks: Mapping[int, Track], directory: Path) -> None:
+    """Write the tracks to ``tracks.npz`` in ``directory``."""
+    ways = {
+        f"{name}_{system}": values
+        for system, track in tracks.items()
+        for name, values in track._asdict().items()
+    }
+    np.savez_compressed(directory / "tracks.npz", allow_pickle=False, **ways)
 
 
 def blind(gap: float) -> list[str]:
