@@ -36,6 +36,9 @@ def test_an_arducopter_is_one_of_a_row(tmp_path) -> None:
     latitude, longitude, altitude, _ = map(float, value_of(found.command, "--home").split(","))
     assert FLEET.to_enu(latitude, longitude, altitude) == pytest.approx([10.0, 0.0, 0.0], abs=0.002)
     assert (found.endpoint, found.told) == ("tcp:127.0.0.1:5780", "tcp:127.0.0.1:5782")
+    apart = launch(Program("ardupilot", str(path), ("--model", "quad")), 3, FLEET, 7.5)
+    latitude, longitude, altitude, _ = map(float, value_of(apart.command, "--home").split(","))
+    assert FLEET.to_enu(latitude, longitude, altitude) == pytest.approx([15.0, 0.0, 0.0], abs=0.002)
 
 
 @pytest.mark.parametrize("named", ["", "bin/px4"])

@@ -15,7 +15,7 @@ from mavlink_bridge.messages import (
 )
 from mavlink_bridge.tlog.log import TlogWriter
 from mavlink_bridge.wire.codec import Codec
-from trials.flown import flown
+from trials.flown import flown, flown_by_clock
 from trials.plan import TARGET
 
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
@@ -85,3 +85,16 @@ def test_a_log_is_read_onto_the_trials_time(tmp_path) -> None:
 def test_who_never_steered_has_not_flown(tmp_path) -> None:
     assert flown(written(tmp_path / "vehicle-3.tlog", steering=False), 3, FLEET, seconds) is None
     assert flown(tmp_path / "vehicle-3.tlog", 9, FLEET, seconds) is None
+
+
+def test_a_log_without_a_target_is_read_onto_the_trials_time_by_the_companions_clock(tmp_path) -> None:
+    def trial(clock):
+        return 105.0 + (clock - 1e-6 * START) / RATE
+
+    found = flown_by_clock(written(tmp_path / "vehicle-3.tlog"), 3, FLEET, trial)
+    assert found is not None
+    times = found.setpoints.times
+    assert (times[0], times[-1]) == (pytest.approx(105.0, abs=0.001), pytest.approx(109.0, abs=0.001))
+    wanted = np.array([place(t - 105.0) for t in times])
+    assert np.abs(found.setpoints.places - wanted).max() < ROUNDED
+    assert flown_by_clock(tmp_path / "vehicle-3.tlog", 9, FLEET, trial) is None

@@ -52,3 +52,17 @@ def test_a_flight_of_which_too_little_is_known_is_not_passed():
     assert blind(0.9 * GAP) == []
     (fault,) = blind(2.9)
     assert "for 2.9 s" in fault
+
+
+@given(VECTORS, VECTORS, st.floats(0.1, 3.0))
+def test_the_way_from_a_time_on_is_the_farthest_place_from_then_on(x, v, since):
+    track = straight(x, v, 0.02)
+    begin = track.times[track.times >= since][0]
+    assert track.moved(since) == pytest.approx(float(np.linalg.norm(v)) * (END - begin), abs=1e-9)
+    assert track.moved(END + 1.0) == 0.0
+
+
+def test_without_a_target_there_are_only_pairs_of_vehicles():
+    here, there = straight(np.zeros(3), np.zeros(3), 0.02), straight(np.ones(3), np.zeros(3), 0.01)
+    (pair,) = nearest({1: here, 2: there})
+    assert (pair.pair, pair.distance) == ((1, 2), pytest.approx(3.0**0.5))

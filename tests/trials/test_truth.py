@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import select
 import socket
 
 import numpy as np
@@ -33,6 +34,9 @@ class Wire:
 
     def tell(self, system: int, data: bytes) -> None:
         self.told.append((system, data))
+
+    def fileno(self) -> None:
+        """None: it is polled."""
 
     def close(self) -> None:
         pass
@@ -98,6 +102,7 @@ def test_tracks_are_by_the_time_of_the_wall_and_know_who_is_armed(rig) -> None:
         wires[2].coming += [beat(2, False), state(2, 5.0)]
         observer.turn()
         clock.wait_until(clock.now() + 100_000)
+    assert observer.place(1) == pytest.approx([0.4, 0.0, 5.0], abs=0.02)
     tracks = observer.tracks()
     assert tracks[1].times == pytest.approx(0.1 * np.arange(5))
     assert tracks[1].places[:, 0] == pytest.approx(0.1 * np.arange(5), abs=0.02)
@@ -112,6 +117,8 @@ def test_tracks_are_by_the_time_of_the_wall_and_know_who_is_armed(rig) -> None:
 
 def test_what_others_say_counts_nowhere(rig) -> None:
     observer, wires, _ = rig
+    assert observer.tracks() == {}
+    assert observer.place(1) is None
     wires[1].coming += [
         beat(9, True),
         Codec().encode(Heartbeat(Source(1, 195), 18, 8, mavlink.MAV_MODE_FLAG_SAFETY_ARMED, 0, 4)),
@@ -133,6 +140,8 @@ def test_a_port_tells_each_vehicle_only_what_is_for_it() -> None:
         received: list[bytes] = []
         while len(received) < 2:
             received += receiver.receive()
+        ends[1].send(beat(1, False))
+        assert select.select([receiver.fileno()], [], [], 5.0)[0]
         receiver.tell(2, b"two")
         receiver.tell(1, b"one")
         receiver.tell(3, b"nobody")

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import ValidationError
 
 from outrider.errors import InputError, OutriderError
@@ -21,6 +20,7 @@ from trials.autopilots import autopilots
 from trials.mishaps import ENDED, mishaps
 from trials.plan import FLAVOURS, MISHAPS, SORTIE, STORIES, Plan
 from trials.progress import Progress
+from trials.separation import save
 from trials.sortie import sortie
 from trials.stage import Stage
 from trials.verdict import verdict
@@ -125,12 +125,7 @@ def trial(plan: Plan, directory: Path) -> dict[str, Any]:
 def _keep(stage: Stage, directory: Path) -> None:
     """Write all events to one file, in the order of the trial's time, and all tracks to another."""
     if stage.observer.ready:
-        ways = {
-            f"{name}_{system}": values
-            for system, track in stage.observer.tracks().items()
-            for name, values in track._asdict().items()
-        }
-        np.savez_compressed(directory / "tracks.npz", allow_pickle=False, **ways)
+        save(stage.observer.tracks(), directory)
     events = [
         {"vehicle": system, **event}
         for system, companion in stage.companions.items()

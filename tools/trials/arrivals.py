@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
-from math import inf
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
+from mavlink_bridge.clocks.clock import Clock, WallClock
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.messages import CommandLong, GpsGlobalOrigin, Heartbeat, LocalPosition
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
-from trials.observer import OWN
+from trials.observer import AGAIN, OWN
 from trials.separation import Track
 
 Array = NDArray[np.float64]
 
-_AGAIN_S: Final = 0.5
-"""Time between two requests for a missing origin (s)."""
-_STEP_S: Final = 0.01
 _MESSAGES: Final = frozenset(
     (
         mavlink.MAVLINK_MSG_ID_HEARTBEAT,
@@ -36,12 +32,19 @@ _MESSAGES: Final = frozenset(
 class Arrivals:
     """Positions of ``systems`` as they arrive on ``link``; ``fleet``: the frame of all positions.
 
-    ``signing``: for the requests; what arrives is not checked.
+    All times are s since the beginning. ``signing``: for the requests; what arrives is not checked.
     """
 
     def __init__(
-        self, link: Link, systems: Sequence[int], fleet: FleetFrame, signing: Signing | None = None
+        self,
+        link: Link,
+        systems: Sequence[int],
+        fleet: FleetFrame,
+        signing: Signing | None = None,
+        clock: Clock | None = None,
     ) -> None:
+        self._clock = WallClock() if clock is None else clock
+        self._begin = self._clock.now()
         self._requests = Codec(None, signing)
         self._link, self._fleet = link, fleet
         self._codec = Codec(
@@ -52,15 +55,28 @@ class Arrivals:
         self._frames: dict[int, LocalFrame | None] = dict.fromkeys(systems)
         self._armed = dict.fromkeys(systems, False)
         self._rows: dict[int, list[tuple[float, tuple[float, float, float], bool]]] = {s: [] for s in systems}
-        self._next = 0.0
+        self._next = 0
 
-    def fileno(self) -> int:
-        """Return the file descriptor of the link."""
+    @property
+    def sockets(self) -> list[int]:
+        """File descriptors of which one is readable when something has arrived."""
         number = self._link.fileno()
-        return -1 if number is None else number
+        return [] if number is None else [number]
 
-    def turn(self, now: float) -> None:
-        """Process everything that has arrived until ``now`` (s), and request missing origins."""
+    @property
+    def latest(self) -> float:
+        """Time since the beginning (s)."""
+        return 1e-6 * (self._clock.now() - self._begin)
+
+    def seconds(self, clock: Array) -> Array:
+        """Return the times (n,) since the beginning (s) at which the wall clock had the values (n,), µs."""
+        since: Array = 1e-6 * (clock - self._begin)
+        return since
+
+    def turn(self) -> None:
+        """Process everything that has arrived, and request missing origins."""
+        clock = self._clock.now()
+        now = 1e-6 * (clock - self._begin)
         for data in self._link.receive():
             for message in self._codec.feed(data, whole=True):
                 system = message.source.system
@@ -71,9 +87,9 @@ class Arrivals:
                 elif isinstance(message, GpsGlobalOrigin):
                     place = message.latitude, message.longitude, message.altitude
                     self._frames[system] = self._fleet.local(*place)
-        if now < self._next:
+        if clock < self._next:
             return
-        self._next = now + _AGAIN_S
+        self._next = clock + AGAIN
         params = (float(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         for system in (system for system, frame in self._frames.items() if frame is None):
             whom = system, mavlink.MAV_COMP_ID_AUTOPILOT1
@@ -95,27 +111,3 @@ class Arrivals:
                 armed = np.array([row[2] for row in rows], dtype=bool)
                 found[system] = Track(np.array([row[0] for row in rows]), places, armed)
         return found
-
-    def moved(self, system: int, since: float) -> float:
-        """Return the largest distance (m) of ``system`` from its place at ``since`` (s), from then on."""
-        track = self.tracks().get(system)
-        if track is None or track.times[-1] <= since:
-            return 0.0
-        places = track.places[track.times >= since]
-        return float(np.linalg.norm(places - places[0], axis=1).max())
-
-    def least(self) -> tuple[float, tuple[int, int]]:
-        """Return the least distance (m) of two vehicles whose motors run, and which two."""
-        tracks = self.tracks()
-        least, pair = inf, (0, 0)
-        if len(tracks) < 2:
-            return 0.0, pair
-        begin = min(track.times[0] for track in tracks.values())
-        end = max(track.times[-1] for track in tracks.values())
-        times = np.arange(begin, end, _STEP_S)
-        places = {system: track.at(times) for system, track in tracks.items()}
-        for one, other in combinations(places, 2):
-            off = np.linalg.norm(places[one] - places[other], axis=1)
-            if not np.isnan(off).all() and (nearest := float(np.nanmin(off))) < least:
-                least, pair = nearest, (one, other)
-        return least, pair

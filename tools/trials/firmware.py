@@ -41,13 +41,13 @@ class StartCommand:
     told: str
 
 
-def launch(program: Program, system: int, fleet: FleetFrame) -> StartCommand:
-    """Return the start parameters of vehicle ``system``, which stands in the row.
+def launch(program: Program, system: int, fleet: FleetFrame, row: float = ROW) -> StartCommand:
+    """Return the start parameters of vehicle ``system``, which stands in a row, ``row`` metres from the next.
 
     The instance is ``system`` − 1, as PX4 derives its system id from it.
     """
     instance = system - 1
-    latitude, longitude, altitude = fleet.to_geodetic((ROW * instance, 0.0, 0.0))
+    latitude, longitude, altitude = fleet.to_geodetic((row * instance, 0.0, 0.0))
     if program.flavour == "ardupilot":
         words = [f"-I{instance}", "--sysid", str(system), "-S", "--speedup", "1"]
         home = f"{latitude:.9f},{longitude:.9f},{altitude:.3f},0"
@@ -98,10 +98,12 @@ def _px4(text: str) -> tuple[Path, Path]:
 
 
 class Firmware:
-    """Running ``programs``, by system id. Raises InputError if a port is in use."""
+    """Running ``programs``, by system id, ``row`` metres apart. Raises InputError if a port is in use."""
 
-    def __init__(self, programs: dict[int, Program], fleet: FleetFrame, directory: Path) -> None:
-        self.launches = {system: launch(program, system, fleet) for system, program in programs.items()}
+    def __init__(
+        self, programs: dict[int, Program], fleet: FleetFrame, directory: Path, row: float = ROW
+    ) -> None:
+        self.launches = {system: launch(program, system, fleet, row) for system, program in programs.items()}
         for system, program in programs.items():
             _free(program.flavour, system)
         self._directory = directory

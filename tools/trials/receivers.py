@@ -21,6 +21,10 @@ _BUFFER: Final = 1 << 20
 class Receiver(Protocol):
     """Receiver for some vehicles, which can also send to them."""
 
+    def fileno(self) -> int | None:
+        """Return the file descriptor that is readable when something has arrived; None without one."""
+        ...
+
     def receive(self) -> list[bytes]:
         """Return the datagrams received since the last call."""
         ...
@@ -39,6 +43,10 @@ class LinkReceiver:
 
     def __init__(self, endpoint: str) -> None:
         self._link = open_link(endpoint, WallClock())
+
+    def fileno(self) -> int | None:
+        """Return the file descriptor of the link."""
+        return self._link.fileno()
 
     def receive(self) -> list[bytes]:
         """Return the datagrams received since the last call."""
@@ -79,6 +87,10 @@ class PortReceiver:
         """Host and port on which it listens."""
         host, port = self._port.getsockname()
         return host, port
+
+    def fileno(self) -> int | None:
+        """Return the file descriptor of the port."""
+        return self._port.fileno()
 
     def receive(self) -> list[bytes]:
         """Return the datagrams received since the last call."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from itertools import combinations
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -46,17 +47,26 @@ class Track(NamedTuple):
         off: Array = np.linalg.norm(self.at(other.times) - other.places, axis=1)
         return off
 
+    def moved(self, since: float) -> float:
+        """Return the largest distance (m) from the place at ``since`` (s), from then on."""
+        places = self.places[self.times >= since]
+        return float(np.linalg.norm(places - places[0], axis=1).max()) if len(places) else 0.0
 
-def nearest(tracks: Mapping[int, Track], target: tuple[int, Callable[[Array], Array]]) -> list[Nearest]:
+
+def nearest(
+    tracks: Mapping[int, Track], target: tuple[int, Callable[[Array], Array]] | None = None
+) -> list[Nearest]:
     """Return the least distance of each pair of ``tracks``, and of each with the ``target``.
 
-    ``target`` is its id, and a function that gives its positions (m, 3) at times (m,).
+    ``target`` is its id, and a function that gives its positions (m, 3) at times (m,); None: there is none.
+    Pairs that were never known to fly at once are left out.
     """
     begin = min(track.times[0] for track in tracks.values())
     end = max(track.times[-1] for track in tracks.values())
     times = np.arange(begin, end, _STEP)
     places = {system: track.at(times) for system, track in tracks.items()}
-    places[target[0]] = target[1](times)
+    if target is not None:
+        places[target[0]] = target[1](times)
     found = []
     for pair in combinations(places, 2):
         off = np.linalg.norm(places[pair[0]] - places[pair[1]], axis=1)
@@ -64,6 +74,16 @@ def nearest(tracks: Mapping[int, Track], target: tuple[int, Callable[[Array], Ar
             k = int(np.nanargmin(off))
             found.append(Nearest((pair[0], pair[1]), float(off[k]), float(times[k])))
     return found
+
+
+def save(tracks: Mapping[int, Track], directory: Path) -> None:
+    """Write the tracks to ``tracks.npz`` in ``directory``."""
+    ways = {
+        f"{name}_{system}": values
+        for system, track in tracks.items()
+        for name, values in track._asdict().items()
+    }
+    np.savez_compressed(directory / "tracks.npz", allow_pickle=False, **ways)
 
 
 def blind(gap: float) -> list[str]:

@@ -115,9 +115,20 @@ class TruthObserver:
         since: Array = (clock - self._begin) * 1e-6
         return since
 
+    @property
+    def sockets(self) -> list[int]:
+        """File descriptors of which one is readable when something has arrived."""
+        numbers = {receiver.fileno() for receiver in self._receivers.values()}
+        return [number for number in numbers if number is not None]
+
+    def place(self, system: int) -> Array | None:
+        """Return the last position (3,) m of ``system``; None before the first."""
+        rows = self.seen[system].rows
+        return np.array(rows[-1][1]) if rows else None
+
     def tracks(self) -> dict[int, Track]:
-        """Return the tracks of all vehicles, by system id."""
-        return {system: one.track(self._begin) for system, one in self.seen.items()}
+        """Return the tracks of the vehicles whose true state was received, by system id."""
+        return {system: one.track(self._begin) for system, one in self.seen.items() if one.rows}
 
     def turn(self) -> None:
         """Process everything that has arrived, and request what is missing."""

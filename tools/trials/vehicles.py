@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Protocol
 
 from mavlink_bridge.frames import FleetFrame
-from trials.autopilots import Program, Running
+from trials.autopilots import Autopilot, Program, Running
 from trials.emulation import Emulation
 from trials.firmware import Firmware
 from trials.observer import Observer, SitlObserver
-from trials.plan import Plan
+from trials.plan import ROW, Plan
 from trials.receivers import open_receivers
 from trials.station import listener
 from trials.truth import TruthObserver
@@ -20,7 +21,10 @@ from trials.truth import TruthObserver
 class Vehicles(Protocol):
     """Vehicles of a trial, and their ``observer``."""
 
-    observer: Observer
+    @property
+    def observer(self) -> Observer:
+        """Observer of the vehicles."""
+        ...
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -73,12 +77,14 @@ class Emulated:
 class Real:
     """Vehicles of real firmware's simulations, started here or already running."""
 
-    def __init__(self, plan: Plan, fleet: FleetFrame, directory: Path) -> None:
-        flown = dict(zip(plan.systems, plan.autopilots, strict=True))
+    def __init__(
+        self, flown: Mapping[int, Autopilot], fleet: FleetFrame, directory: Path, row: float = ROW
+    ) -> None:
+        """Start those of ``flown``, by system id, that are programs, ``row`` metres apart."""
         programs = {system: one for system, one in flown.items() if isinstance(one, Program)}
         running = {system: one for system, one in flown.items() if isinstance(one, Running)}
         with ExitStack() as files:
-            self._firmware = Firmware(programs, fleet, directory)
+            self._firmware = Firmware(programs, fleet, directory, row)
             files.callback(self._firmware.close)
             launches = self._firmware.launches
             self._endpoints = {
@@ -93,7 +99,7 @@ class Real:
             for receiver in receivers.values():
                 files.callback(receiver.close)
             flavours = {system: one.flavour for system, one in flown.items()}
-            self.observer: Observer = TruthObserver(receivers, flavours, fleet)
+            self.observer = TruthObserver(receivers, flavours, fleet)
             self._files = files.pop_all()
 
     @property
@@ -116,4 +122,6 @@ class Real:
 
 def vehicles(plan: Plan, fleet: FleetFrame, directory: Path) -> Vehicles:
     """Return the vehicles of ``plan``; their files are in ``directory``."""
-    return Real(plan, fleet, directory) if plan.autopilots else Emulated(plan, fleet, directory)
+    if not plan.autopilots:
+        return Emulated(plan, fleet, directory)
+    return Real(dict(zip(plan.systems, plan.autopilots, strict=True)), fleet, directory)
