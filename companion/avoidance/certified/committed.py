@@ -20,9 +20,15 @@ from mavlink_bridge.wire.plan import Integers, WirePlan, quantise
 _MM = 1e-3
 
 
-def resting(epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: int) -> WirePlan:
-    """Return the plan to hold ``position`` (3,), m (rounded to the wire), from ``epoch`` (µs) on."""
-    return quantise(epoch, dt, position, np.zeros(3), np.zeros((steps, 3)), origin)
+def resting(
+    epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: int, *, column: bool = False
+) -> WirePlan:
+    """Return the plan to hold ``position`` (3,), m (rounded to the wire), from ``epoch`` (µs) on.
+
+    ``column``: the vehicle may be at any height.
+    """
+    plan = quantise(epoch, dt, position, np.zeros(3), np.zeros((steps, 3)), origin)
+    return plan._replace(column=column)
 
 
 def rests(plan: WirePlan) -> bool:
