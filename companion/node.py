@@ -175,6 +175,7 @@ class Companion:
         if not self._has_to_act(now):
             return self._encode(ground=answers)
         view = self.world.at(now)
+        self.pilot.column_waits = self.avoidance.wait(now)
         commands = self.pilot.step(now, view)
         self.world.doubt = self.pilot.vehicle.positioning.radius + self.avoidance.tracking.excess
         requests: list[Message] = [*self._round_trips.due(now, self.world.late)]
@@ -188,7 +189,7 @@ class Companion:
         if now >= self._sharing.next_due:
             shared = self._sharing.due(now, view, self.avoidance.shared(now, view), self.world.doubt)
         leaving = self.pilot.phase in (Phase.LAND, Phase.DONE) or (self._finishing and self.pilot.streaming)
-        announced = self.avoidance.messages(now, farewell=leaving)
+        announced = self.avoidance.messages(now, farewell=leaving or self.avoidance.parked)
         autopilot = [*commands, *requests, *setpoints, *shared.autopilot]
         swarm, ground = [*shared.swarm, *announced], answers
         if self._reports_on:

@@ -110,6 +110,11 @@ class CertifiedConfig(Settings):
     tube: Positive = Field(
         0.25, description="m, largest tracking error for which plans keep their separation"
     )
+    drift: Positive = Field(
+        0.5,
+        description="m, largest horizontal distance from its column's axis of a vehicle that its autopilot"
+        " takes off or lands",
+    )
     sigmas: float = Field(3.0, ge=0.0, le=6.0, description="k of k·σ of the position estimate")
     clock_us: int = Field(5_000, ge=0, le=100_000, description="µs that a clock may differ from fleet time")
     fleet_time: Literal["own", "measured"] = Field(

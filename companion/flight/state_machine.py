@@ -25,6 +25,7 @@ from companion.flight.takeoff import Takeoff
 from companion.flight.vehicle import Vehicle
 from companion.values.horizon import Array
 from companion.values.phase import STEERED, Phase
+from companion.values.stance import Stance
 from companion.world import View
 from mavlink_bridge.messages import CommandAck, Message, ParamValue, Source
 
@@ -49,6 +50,9 @@ class Pilot:
         self.phase = Phase.CONNECT
         self.vehicle = Vehicle()
         self.waiting_for = "a heartbeat of the autopilot"
+        self.column_waits = ""
+        """What the autopilot must wait for before it takes off or lands; an empty string: nothing."""
+        self._ready = self._clear_to_land = False
         self._settling_since: int | None = None
         self._landed_at: int | None = None
         self._returning = False
@@ -68,6 +72,16 @@ class Pilot:
     def profile(self) -> Profile | None:
         """Profile of the autopilot, None for an unknown one."""
         return self.vehicle.profile
+
+    @property
+    def stance(self) -> Stance:
+        """Stance of the vehicle to its column of air."""
+        if self.phase is Phase.SETTLE and self._clear_to_land:
+            return Stance.LOWERS
+        if self.phase is Phase.CONNECT and self.vehicle.alive and not self.vehicle.flies:
+            return Stance.JOINS if self._ready else Stance.PARKED
+        climbs = self.phase is Phase.PREPARE and not self._takeoff.began_in_flight
+        return Stance.CLIMBS if climbs else Stance.FREE
 
     @property
     def limits(self) -> AutopilotLimits:
@@ -243,12 +257,14 @@ class Pilot:
             self.phase = Phase.SETTLE
 
     def settled(self) -> None:
-        """Report that the vehicle hovers clear of the others: it lands now."""
+        """Report that the vehicle hovers clear of the others: it lands once its column is reserved."""
         if self.phase is Phase.SETTLE:
-            self._begin_landing()
+            self._clear_to_land = True
+            if not self.column_waits:
+                self._begin_landing()
 
     def _begin_landing(self) -> None:
-        self.phase, self._landed_at = Phase.LAND, None
+        self.phase, self._landed_at, self._clear_to_land = Phase.LAND, None, False
         self._arming = self._takeoff.asked_to_arm
         self._commands.forget()
         self._passage = Passage(self.vehicle.mode)
@@ -347,22 +363,30 @@ class Pilot:
     def _start_anew(self) -> None:
         """Restart from the beginning: a new go is needed."""
         self.phase, self._owner, self._settling_since = Phase.CONNECT, Owner.OURS, None
-        self._returning = False
+        self._returning = self._ready = self._clear_to_land = False
         self._height = None
         self._commands.forget()
         self._readiness.forget()
 
     def _settle(self, now: int, view: View) -> None:
-        """Land at once if the own position is stale or the time limit for settling is exceeded."""
+        """Land if the column is reserved, the own position is stale or the time limit is exceeded.
+
+        The last two do not wait for a reservation.
+        """
         since = self._settling_since = now if self._settling_since is None else self._settling_since
         blind = view.own is None or view.own.age > self._config.guard.own_stale_us
-        if blind or now - since > self._config.guard.settle_us:
+        reserved = self._clear_to_land and not self.column_waits
+        if reserved or blind or now - since > self._config.guard.settle_us:
             self._begin_landing()
 
     def _connect(self, now: int, view: View) -> list[Message]:
         self._expire_go(now)
         self.waiting_for = self._readiness.missing(view, go=self._height is not None)
         calls = self._readiness.requests(now)
+        self._ready = not self.waiting_for
+        if self._ready and not self.vehicle.flies:
+            # The autopilot may disarm a vehicle that waits with its motors on.
+            self.waiting_for = self.column_waits
         if not self.waiting_for and view.own is not None and view.local is not None:
             self._takeoff.begin(view.own)
             self._passage = Passage(self.vehicle.mode)
@@ -402,10 +426,11 @@ class Pilot:
         if self.phase is not Phase.PREPARE or view.own is None:
             return []
         step = takeoff.step(profile)
-        sent = takeoff.advance(now, profile, view.own, height, self._floor(view))
+        climbs = not self.column_waits
+        sent = takeoff.advance(now, profile, view.own, height, self._floor(view), climbs=climbs)
         if takeoff.step(profile) is None:
             self.phase = Phase.ESCORT
             self._authority.begin()
         elif step is not None and takeoff.step(profile) is step:
-            self.waiting_for = step.value
+            self.waiting_for = step.value if climbs or step is not Step.TAKEOFF else self.column_waits
         return sent

@@ -56,6 +56,11 @@ class Takeoff:
         self._at_rest_since = None
         self._step = 0
 
+    @property
+    def began_in_flight(self) -> bool:
+        """Whether the vehicle flew already when the last take-off began."""
+        return self._flying_already
+
     def step(self, profile: Profile) -> Step | None:
         """Return the present step; None when all are done."""
         return profile.steps[self._step] if self._step < len(profile.steps) else None
@@ -76,12 +81,19 @@ class Takeoff:
         return not self._flying_already and climbed > _RISEN_SHARE * height
 
     def advance(
-        self, now: int, profile: Profile, own: State, height: float, floor: float = inf
+        self,
+        now: int,
+        profile: Profile,
+        own: State,
+        height: float,
+        floor: float = inf,
+        *,
+        climbs: bool = True,
     ) -> list[Message]:
         """Return the commands to send at ``now`` (µs) on the way to ``height`` (m above the ground).
 
         ``floor``: the lowest height (m, fleet-local) of plans that can take over during the climb; ∞ where
-        they cannot.
+        they cannot. ``climbs``: whether the autopilot may be ordered to climb.
         """
         vehicle = self._vehicle
         step = profile.steps[self._step]
@@ -101,7 +113,8 @@ class Takeoff:
             altitude = above_sea if profile.takeoff_absolute else height
             up = self._flying_already or vehicle.landed_state not in _NOT_FLYING
             climb = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude)
-            call = [] if up else self._commands.call(now, mavlink.MAV_CMD_NAV_TAKEOFF, climb)
+            waits = up or not climbs
+            call = [] if waits else self._commands.call(now, mavlink.MAV_CMD_NAV_TAKEOFF, climb)
         if done:
             self._step += 1
             self._commands.forget()

@@ -23,6 +23,7 @@ from mavlink_bridge.messages import (
 HEARTBEAT_LOST = 3_000_000
 """µs without a heartbeat after which the autopilot's mode is unknown."""
 _MAX_TEXTS = 16
+_CRUISING = (mavlink.MAV_LANDED_STATE_IN_AIR, mavlink.MAV_LANDED_STATE_UNDEFINED)
 
 
 class Vehicle:
@@ -109,6 +110,14 @@ class Vehicle:
     def flies(self) -> bool:
         """Whether the vehicle may be in the air: armed, and not reported as on the ground."""
         return self.armed and self.landed_state != mavlink.MAV_LANDED_STATE_ON_GROUND
+
+    @property
+    def cruises(self) -> bool:
+        """Whether the vehicle is in the air and its autopilot reports neither a take-off nor a landing.
+
+        Without a report it is in the air while it is armed.
+        """
+        return self.flies and self.landed_state in _CRUISING
 
     @property
     def left_by_us(self) -> bool:

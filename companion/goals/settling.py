@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from companion.avoidance.certified.margins import between, further
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Motion
 from companion.values.obstacles import Obstacles
 
 _EXTRA_CLEARANCE_M = 0.5
-"""Distance beyond ``guard.landing_clearance`` when moving aside to land."""
+"""Distance beyond the clearance when moving aside to land."""
 _MIN_PASSING_M, _MAX_WAIT_US = 1.0, 5_000_000
 """Motion within a horizon above which an obstacle is passing, and the longest wait for it."""
 _MIN_DISTANCE_M = 1e-3
@@ -20,11 +21,15 @@ class Settling:
     """Place to come to rest before landing.
 
     ``clear``: whether no obstacle was near horizontally when ``rest`` was last called with a speed below
-    ``guard.landing_speed``. Heights do not count, because landing is straight down.
+    ``guard.landing_speed``. Heights do not count, because landing is straight down. Near is within
+    ``guard.landing_clearance``, and with committed plans within the distance of two columns.
     """
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
+        self._clearance = config.guard.landing_clearance
+        if config.avoidance == "certified":
+            self._clearance = max(self._clearance, between_columns(config))
         self._rest: Array | None = None
         self._waiting_since: int | None = None
         self.clear = False
@@ -55,7 +60,7 @@ class Settling:
     def _in_the_way(self, here: Array, obstacles: Obstacles) -> int | None:
         """Return the index of the horizontally nearest obstacle; None without one within the clearance."""
         distance = np.linalg.norm(here[:2] - obstacles.positions[:, 0, :2], axis=1) - obstacles.radius
-        if distance.min(initial=np.inf) > self._config.guard.landing_clearance:
+        if distance.min(initial=np.inf) > self._clearance:
             return None
         return int(np.argmin(distance))
 
@@ -73,5 +78,10 @@ class Settling:
         offset = here[:2] - centre[:2]
         length = float(np.hypot(offset[0], offset[1]))
         away = offset / length if length > _MIN_DISTANCE_M else _EAST
-        distance = radius + self._config.guard.landing_clearance + _EXTRA_CLEARANCE_M
+        distance = radius + self._clearance + _EXTRA_CLEARANCE_M
         return np.append(centre[:2] + distance * away, here[2])
+
+
+def between_columns(config: CompanionConfig) -> float:
+    """Return the least distance (m) between two columns."""
+    return between(config.certified, config.field, config.limits) + 2.0 * further(config.certified)

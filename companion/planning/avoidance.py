@@ -13,6 +13,7 @@ from companion.flight.lowering import Lowered
 from companion.flight.tracking import Tracking
 from companion.values.horizon import Array, Horizon, Motion
 from companion.values.refused_senders import RefusedSenders
+from companion.values.stance import Stance
 from companion.world import View
 from mavlink_bridge.messages import Message
 
@@ -125,6 +126,19 @@ class Avoidance(Protocol):
 
     def rest(self) -> None:
         """Discard the horizon and the state of tracking while set-points do not control the vehicle."""
+        ...
+
+    def park(self, now: int, measured: Motion, stance: Stance) -> None:
+        """Reserve the place of a vehicle that set-points do not steer, with its ``measured`` motion."""
+        ...
+
+    def wait(self, now: int) -> str:
+        """Return what the autopilot must wait for before it takes off or lands; an empty string: nothing."""
+        ...
+
+    @property
+    def parked(self) -> bool:
+        """Whether the vehicle stands on the ground and takes no part."""
         ...
 
     def fly(self, now: int, situation: AvoidanceInputs) -> Array | None:

@@ -18,9 +18,13 @@ from companion.planning.avoidance import AvoidanceInputs, Tally
 from companion.planning.plan_times import PlanTimes
 from companion.values.horizon import Array, Horizon, Motion
 from companion.values.refused_senders import RefusedSenders
+from companion.values.stance import Stance
 from companion.world import View, World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
+
+_NOT_ASKED = "its column"
+"""What a vehicle waits for that has not begun to reserve it."""
 
 
 class VehicleParts(NamedTuple):
@@ -89,6 +93,22 @@ class CertifiedAvoidance:
         """Hold the ``measured`` position, or continue the committed plan, see ``CertifiedFlight.stand``."""
         self._flight.stand(now, measured.position)
 
+    def park(self, now: int, measured: Motion, stance: Stance) -> None:
+        """Hold the column of a vehicle on the ground, or one that climbs, see ``CertifiedFlight.park``."""
+        joins = stance is not Stance.PARKED
+        self._flight.park(now, measured, joins=joins, climbs=stance is Stance.CLIMBS)
+
+    def wait(self, now: int) -> str:
+        """Return what is missing for the reservation of the column; an empty string: nothing."""
+        waits = self._pilot.stance in (Stance.JOINS, Stance.CLIMBS, Stance.LOWERS)
+        return self._flight.reservation.missing(now) if waits else _NOT_ASKED
+
+    @property
+    def parked(self) -> bool:
+        """Whether the vehicle has a column on the ground and takes no part."""
+        flight = self._flight
+        return self._pilot.stance.grounded and flight.commitment.column and not flight.reservation.joined
+
     def pause(self, gap: int) -> None:
         """Do nothing: a committed plan stays valid."""
 
@@ -123,8 +143,14 @@ class CertifiedAvoidance:
             flight.watch(now, situation.measured)
         if self._config.tracking.compensate:
             self._observe(now, situation)
-        if self._pilot.guided and not self._finishing and flight.due(now):
-            self._replan(now, situation)
+        if self._pilot.guided and not self._finishing:
+            lowers = self._pilot.stance is Stance.LOWERS
+            if lowers and flight.lower(now):
+                pass
+            elif flight.commitment.column:
+                flight.leave_column(now, situation.measured, flies=self._pilot.vehicle.cruises)
+            elif flight.due(now):
+                self._replan(now, situation)
         self.horizon = horizon = flight.horizon()
         if horizon is None or now < self.next_due:
             return None

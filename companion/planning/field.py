@@ -21,6 +21,7 @@ from companion.planning.plan_times import PlanTimes
 from companion.values.horizon import Array, Horizon, Motion, roll_out
 from companion.values.phase import Phase
 from companion.values.refused_senders import RefusedSenders
+from companion.values.stance import Stance
 from companion.values.vectors import clipped
 from companion.world import View, World
 from mavlink_bridge.messages import Message
@@ -31,6 +32,8 @@ class FieldAvoidance:
 
     ``planner`` makes plans; ``guard`` stores the flown horizon and replaces it by a brake.
     """
+
+    parked = False
 
     def __init__(self, config: CompanionConfig, world: World, pilot: Pilot, times: PlanTimes) -> None:
         self._config, self._world, self._pilot, self._times = config, world, pilot, times
@@ -94,6 +97,13 @@ class FieldAvoidance:
     def begin(self, now: int, measured: Motion) -> None:
         """Start with a brake from the ``measured`` motion; it is flown until the first plan."""
         self.guard.start(now, measured)
+
+    def park(self, now: int, measured: Motion, stance: Stance) -> None:
+        """Do nothing: the field does not reserve places."""
+
+    def wait(self, now: int) -> str:
+        """Return an empty string: a vehicle takes off and lands without asking others."""
+        return ""
 
     def pause(self, gap: int) -> None:
         """Discard the flown horizon after a long ``gap`` (µs).

@@ -14,6 +14,7 @@ from companion.planning.certified import CertifiedAvoidance, VehicleParts
 from companion.planning.fleet_time_world import FleetTimeWorld
 from companion.values.horizon import Array, Motion, roll_out
 from companion.values.refused_senders import RefusedSenders
+from companion.values.stance import Stance
 from companion.world import World
 from mavlink_bridge.messages import Message, Timesync, Tunnel
 from mavlink_bridge.wire.fleet_time import PAYLOAD_TYPE
@@ -40,6 +41,18 @@ class FleetTimeAvoidance(CertifiedAvoidance):
         fleet = self._fleet_time(now)
         if fleet is not None:
             super().begin(fleet, measured)
+
+    def park(self, now: int, measured: Motion, stance: Stance) -> None:
+        """Hold the column of a vehicle on the ground, or one that climbs, once fleet time is known."""
+        fleet = self._fleet_time(now)
+        if fleet is not None:
+            super().park(fleet, measured, stance)
+
+    def wait(self, now: int) -> str:
+        """Return what is missing for the reservation of the column; an empty string: nothing."""
+        if self._clock.ahead is None or self._clock.trouble is not None:
+            return "fleet time"
+        return super().wait(now + self._clock.ahead)
 
     def fly(self, now: int, situation: AvoidanceInputs) -> Array | None:
         """Bring the committed plan up to date, see ``CertifiedAvoidance.fly``."""
@@ -95,7 +108,7 @@ class FleetTimeAvoidance(CertifiedAvoidance):
     def _fleet_time(self, now: int) -> int | None:
         """Return fleet time (µs) at ``now`` (µs); None if it is not known."""
         clock = self._clock
-        free = not self._flight.commitment.announced_until
+        free = not self._flight.commitment.announced_until or self.parked
         if clock.step(now, free=free) and clock.ahead is not None:
             if self._flight.commitment.current is not None:
                 self._flight = CertifiedFlight(self._config, self._own, self._fleet)

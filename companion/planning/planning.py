@@ -17,6 +17,7 @@ from companion.planning.avoidance import Avoidance, AvoidanceInputs
 from companion.values.horizon import Array, Motion
 from companion.values.obstacles import Obstacles
 from companion.values.phase import Phase
+from companion.values.stance import Stance
 from companion.values.vectors import clipped
 from companion.world import View, World
 from mavlink_bridge.frames import LocalFrame
@@ -65,12 +66,18 @@ class Planning:
             self._keep(self._pilot.limits.lowered)
         avoidance.pause(now - self._stepped)
         self._stepped = now
-        if not self._pilot.streaming or view.own is None or view.local is None:
+        if view.own is None or view.local is None:
             avoidance.rest()
             return
         stale = view.own.age > self._config.guard.own_stale_us
         # A faulty autopilot, or a sender that uses its id, must not cause set-points above v_max.
         measured = Motion(view.own.position, clipped(view.own.velocity, self.fastest), _ZERO)
+        if not self._pilot.streaming:
+            avoidance.rest()
+            stance = self._pilot.stance
+            if stance is Stance.CLIMBS or (stance.grounded and not stale):
+                avoidance.park(now, measured, stance)
+            return
         if avoidance.horizon is None:
             if stale or view.yaw is None:
                 return

@@ -5,6 +5,9 @@ Sender and receiver hold the same numbers, bit for bit. A plan is piecewise cons
 velocities in units of A dt and positions in units of ½ A dt², the exact motion over a knot, p' = p + v dt + ½
 a dt², v' = v + a dt, is p' = p + 2v + a, v' = v + a in integers: nothing is ever rounded again.
 
+A plan of kind ``COLUMN`` is one of a vehicle that may be at any height above and below it, because its
+autopilot takes it off or lands it: others keep horizontal distances from it.
+
 Sizes in bytes, little endian: kind 1, origin 1, dt/4 µs 2, epoch 7, position 3×4, velocity 3×3, then 3×2 for
 each knot: 32 + 6 N bytes, N ≤ 16.
 """
@@ -26,7 +29,8 @@ PAYLOAD_TYPE = 0xDC01
 """TUNNEL.payload_type; values above 32767 are free for private use."""
 KNOTS = 16
 """Largest number of knots N."""
-KIND = 1
+KIND, COLUMN = 1, 2
+"""Kinds: a plan in space, and one whose heights do not count."""
 STEP = 4
 """Unit of dt (µs); dt is a whole multiple of it."""
 
@@ -42,7 +46,8 @@ class WirePlan(NamedTuple):
     """Plan in the integers of the wire.
 
     ``epoch`` and ``dt`` in µs; ``position``, ``velocity``, ``accelerations`` in the units of the module's
-    docstring (fleet-local ENU); ``origin``: 8-bit fingerprint of that frame.
+    docstring (fleet-local ENU); ``origin``: 8-bit fingerprint of that frame. ``column``: heights do not
+    count, the vehicle may be at any.
     """
 
     epoch: int
@@ -51,6 +56,7 @@ class WirePlan(NamedTuple):
     velocity: Integers
     accelerations: tuple[Integers, ...]
     origin: int
+    column: bool = False
 
     def states(self) -> npt.NDArray[np.int64]:
         """Return the exact position and velocity at every knot, (N+1, 2, 3), in wire units."""
@@ -84,7 +90,14 @@ class WirePlan(NamedTuple):
             (vx, vy, vz),
             self.accelerations[knots:],
             self.origin,
+            self.column,
         )
+
+    def at_height(self, height: float) -> WirePlan:
+        """Return the same plan at rest at ``height`` (m, rounded to the wire), with heights that count."""
+        x, y, _ = self.position
+        position = x, y, round(height / _position_unit(self.dt))
+        return self._replace(position=position, column=False)
 
     @property
     def position_m(self) -> Array:
@@ -165,8 +178,9 @@ def _in_wire_units(
 
 def pack(plan: WirePlan) -> bytes:
     """Encode ``plan`` in 32 + 6 N bytes; raise PlanWireError for a value that does not fit."""
-    epoch, dt, position, velocity, accelerations, origin = plan
-    return _packed(epoch, dt, (*position, *velocity, *chain.from_iterable(accelerations)), origin)
+    epoch, dt, position, velocity, accelerations, origin, column = plan
+    numbers = *position, *velocity, *chain.from_iterable(accelerations)
+    return _packed(epoch, dt, numbers, origin, COLUMN if column else KIND)
 
 
 def packed(
@@ -182,15 +196,18 @@ def packed(
     return _packed(int(epoch), int(dt), numbers, origin)
 
 
-def _packed(epoch: int, dt: int, numbers: Sequence[int], origin: int) -> bytes:
-    """Encode a plan; ``numbers`` are position, velocity and accelerations (6 + 3 N,) in wire units."""
+def _packed(epoch: int, dt: int, numbers: Sequence[int], origin: int, kind: int = KIND) -> bytes:
+    """Encode a plan of ``kind``.
+
+    ``numbers``: position, velocity and accelerations (6 + 3 N,) in wire units.
+    """
     knots = (len(numbers) - 6) // 3
     if knots > KNOTS:
         raise PlanWireError(f"{knots} knots are more than {KNOTS}")
     _check_step(dt)
     try:
         speed = b"".join(v.to_bytes(3, "little", signed=True) for v in numbers[3:6])
-        header = _HEADER.pack(KIND, origin, dt // STEP, epoch.to_bytes(7, "little"), *numbers[:3], speed)
+        header = _HEADER.pack(kind, origin, dt // STEP, epoch.to_bytes(7, "little"), *numbers[:3], speed)
         return header + _KNOTS[knots].pack(*numbers[6:])
     except (OverflowError, StructError):
         raise PlanWireError(
@@ -217,7 +234,7 @@ def unpack_motion(data: bytes) -> PlannedMotion:
 
     The numbers are those of the properties of ``WirePlan``.
     """
-    epoch, dt, position, velocity, origin = _head(data)
+    epoch, dt, position, velocity, origin, _ = _head(data)
     return PlannedMotion(
         epoch,
         dt,
@@ -230,18 +247,19 @@ def unpack_motion(data: bytes) -> PlannedMotion:
 
 def unpack(data: bytes) -> WirePlan:
     """Decode the plan in a TUNNEL payload; raise PlanWireError for anything that ``pack`` cannot produce."""
-    epoch, dt, position, velocity, origin = _head(data)
-    return WirePlan(epoch, dt, position, velocity, tuple(_KNOT.iter_unpack(data[_HEADER.size :])), origin)
+    epoch, dt, position, velocity, origin, column = _head(data)
+    knots = tuple(_KNOT.iter_unpack(data[_HEADER.size :]))
+    return WirePlan(epoch, dt, position, velocity, knots, origin, column)
 
 
-def _head(data: bytes) -> tuple[int, int, Integers, Integers, int]:
-    """Return epoch, dt, position, velocity and origin of a plan in a TUNNEL payload; check its length."""
+def _head(data: bytes) -> tuple[int, int, Integers, Integers, int, bool]:
+    """Return all of a plan in a TUNNEL payload but its accelerations; check its length."""
     knots, rest = divmod(len(data) - _HEADER.size, _KNOT.size)
     if rest or not 0 <= knots <= KNOTS:
         raise PlanWireError(f"{len(data)} bytes are not a plan")
     kind, origin, steps, epoch, px, py, pz, velocity = _HEADER.unpack_from(data)
-    if kind != KIND:
-        raise PlanWireError(f"kind {kind} is not a plan of kind {KIND}")
+    if kind not in (KIND, COLUMN):
+        raise PlanWireError(f"kind {kind} is not a plan of kind {KIND} or {COLUMN}")
     if steps == 0:
         raise PlanWireError("a plan with dt = 0")
     speed = (
@@ -249,4 +267,4 @@ def _head(data: bytes) -> tuple[int, int, Integers, Integers, int]:
         int.from_bytes(velocity[3:6], "little", signed=True),
         int.from_bytes(velocity[6:9], "little", signed=True),
     )
-    return int.from_bytes(epoch, "little"), steps * STEP, (px, py, pz), speed, origin
+    return int.from_bytes(epoch, "little"), steps * STEP, (px, py, pz), speed, origin, kind == COLUMN

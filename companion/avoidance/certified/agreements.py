@@ -44,7 +44,8 @@ class Agreements:
     def __init__(
         self, own: int, config: CertifiedConfig, steps: int, fleet: FleetIdentity, geometry: Geometry
     ) -> None:
-        self._own, self._config, self._steps, self._fleet = own, config, steps, fleet
+        self.own = own
+        self._config, self._steps, self._fleet = config, steps, fleet
         self._plans = PlanFile()
         self._negotiation = Negotiation(self._plans, steps, geometry)
         self._peers = {system: Peer(own, system) for system in set(config.fleet) - {own}}
@@ -68,7 +69,7 @@ class Agreements:
             # Most payloads repeat the last one.
             peer.last_received = now
             return
-        if system == self._own:
+        if system == self.own:
             return
         try:
             plan, at_rest = read(payload)
@@ -107,7 +108,7 @@ class Agreements:
 
     def receive_statement(self, now: int, system: int, statement: Statement) -> None:
         """Receive a statement of ``system``; refuse one of another fleet, or of a clock that is ahead."""
-        if system == self._own:
+        if system == self.own:
             return
         if statement.fingerprint != self.fingerprint:
             self._refuse_fleet(now, system)
@@ -139,7 +140,7 @@ class Agreements:
 
     def _known(self, system: int) -> Peer:
         if system not in self._peers:
-            self._peers[system] = Peer(self._own, system)
+            self._peers[system] = Peer(self.own, system)
             self._members = None
         return self._peers[system]
 
@@ -195,7 +196,7 @@ class Agreements:
             known = set(self._peers)
             for peer in self._peers.values():
                 known.update(system for system, departed in peer.names.items() if not departed)
-            self._members = frozenset(known) - {self._own} - self.left.keys()
+            self._members = frozenset(known) - {self.own} - self.left.keys()
         return self._members
 
     @property
@@ -223,6 +224,12 @@ class Agreements:
         return found
 
     @property
+    def columns(self) -> frozenset[int]:
+        """Systems whose newest plan is a column."""
+        newest = ((system, peer.plans.newest) for system, peer in self._peers.items())
+        return frozenset(system for system, plan in newest if plan is not None and plan.plan.column)
+
+    @property
     def outside(self) -> float:
         """Largest distance (m) by which a member has left its tube, by its newest statement."""
         return max((peer.outside for peer in self._peers.values() if peer.left is None), default=0.0)
@@ -235,6 +242,36 @@ class Agreements:
         """Return the members without an agreement that both vehicles state."""
         peers = ((system, self._peers.get(system)) for system in self.members)
         return {system for system, peer in peers if peer is None or peer.pair.confirmed is None}
+
+    def unreserved(self) -> set[int]:
+        """Return the vehicles beside which the own newest plan, a column, is not reserved.
+
+        They are the members without an agreement on an own column that both state, those with which another
+        agreement is still kept, and departed ones whose last plan is too near.
+        """
+        found = self.missing()
+        for system, peer in self._peers.items():
+            if peer.left is None and not all(self._on_column(one) for one in peer.pair.kept):
+                found.add(system)
+        return found | self.near(self.left)
+
+    def _on_column(self, one: Agreement) -> bool:
+        own = self._plans.get(one.own)
+        return own is not None and own.plan.column
+
+    def near(self, plans: dict[int, StoredPlan] | None = None) -> set[int]:
+        """Return the systems of which one of the ``plans`` is too near for an agreement with the own column.
+
+        The column is that of the own newest plan. Without ``plans``: the newest that are known.
+        """
+        newest = self._plans.newest
+        if plans is None:
+            known = {system: peer.left or peer.plans.newest for system, peer in self._peers.items()}
+            plans = {system: plan for system, plan in known.items() if plan is not None}
+        if newest is None:
+            return set()
+        own = newest._replace(plan=newest.plan._replace(column=True))
+        return {system for system, plan in plans.items() if not self._negotiation.clear(own, plan)}
 
     def outdated(self, now: int, epoch: int) -> bool:
         """Return whether an agreement on the plans of ``epoch`` (µs) may soon replace an older one.

@@ -65,19 +65,25 @@ class Commitment:
         self.current: WirePlan | None = None
         # Caches of values derived from ``current``, and from both plans, which are needed several times.
         self._carried_cache: tuple[WirePlan, WirePlan, Array] | None = None
-        self._horizon_cache: tuple[WirePlan, WirePlan | None, Horizon] | None = None
+        self._horizon_cache: tuple[WirePlan, WirePlan | None, float | None, Horizon] | None = None
         self.following: WirePlan | None = None
         self.held: dict[HoldReason, int] = dict.fromkeys(HoldReason, 0)
         self.anchored_anew = 0
+        self.height: float | None = None
+        """Height (m) that is flown while the current plan is a column; None: that of the plan."""
 
     def epoch(self, now: int) -> int:
         """Return the beginning (µs) of the epoch that holds ``now`` (µs)."""
         return now - now % self._config.epoch_us
 
-    def begin(self, now: int, position: Array) -> int:
-        """Hold ``position`` (3,), m; return the epoch (µs) of the plan to announce, the first unannounced."""
+    def begin(self, now: int, position: Array, *, column: bool = False) -> int:
+        """Hold ``position`` (3,), m, or its ``column``; return the epoch (µs) of the plan to announce.
+
+        That is the first unannounced one.
+        """
         epoch, steps, length = self.epoch(now), self._program.n, self._config.epoch_us
-        self.current = resting(epoch, self._config.dt_us, steps, position, self._origin)
+        self.current = resting(epoch, self._config.dt_us, steps, position, self._origin, column=column)
+        self.height = None
         free = max(epoch, self.announced_until) + length
         if not self.announced_until:
             # Before a restart the companion may have announced the plan of its next epoch, by a clock ahead.
@@ -90,6 +96,8 @@ class Commitment:
         epoch = self.epoch(now)
         if self.following is not None and self.following.epoch <= epoch:
             self.current, self.following = self.following, None
+            if not self.current.column:
+                self.height = None
         if self.current is not None and self.current.epoch < epoch:
             # No plan was announced in the meantime, so no vehicle can rely on a newer plan.
             self.current = carried_on(self.current, (epoch - self.current.epoch) // self.current.dt)
@@ -111,6 +119,32 @@ class Commitment:
         """Continue the committed plan in the next epoch, and count the reason."""
         self.following = self.start()
         self.held[reason] += 1
+
+    @property
+    def column(self) -> bool:
+        """Whether the newest plan is a column."""
+        newest = self.announced()
+        return newest is not None and newest.column
+
+    def raise_column(self) -> None:
+        """Continue the committed plan in the next epoch as a column: from then on heights do not count."""
+        self.following = self.start()._replace(column=True)
+
+    def hover(self, height: float) -> None:
+        """Fly the column at ``height`` (m), if that is further than the tube from where it is flown."""
+        if self.current is None or not self.current.column:
+            return
+        flown = self.current.position_m[2] if self.height is None else self.height
+        if abs(height - flown) > self._config.tube:
+            self.height = height
+
+    def leave_column(self) -> None:
+        """Make the column, which rests, a plan in space from the next epoch on, at the height that is flown.
+
+        All agreements that it keeps have upright planes, so it keeps them at any height.
+        """
+        start = self.start()
+        self.following = start.at_height(start.position_m[2] if self.height is None else self.height)
 
     def own(self) -> Array:
         """Return control points (n, 3, 3) of the committed plan from the next epoch on, m."""
@@ -193,10 +227,21 @@ class Commitment:
             self._horizon_cache is None
             or self._horizon_cache[0] is not self.current
             or self._horizon_cache[1] is not self.following
+            or self._horizon_cache[2] != self.height
         ):
             horizon = horizon_of(self.current, self.following, self._config.knots)
-            self._horizon_cache = self.current, self.following, horizon
-        return self._horizon_cache[2]
+            if self.height is not None:
+                self._flown(horizon.knots, self.height)
+            self._horizon_cache = self.current, self.following, self.height, horizon
+        return self._horizon_cache[3]
+
+    def _flown(self, knots: Array, height: float) -> None:
+        """Set the ``knots`` of columns to the ``height`` (m) that is flown."""
+        split = len(knots) if self.following is None else self._config.knots
+        for plan, part in ((self.current, knots[:split]), (self.following, knots[split:])):
+            if plan is not None and plan.column:
+                part[:, 2] = height
+                part[:, 5::3] = 0.0
 
     def announced(self) -> WirePlan | None:
         """Return the plan to announce: the next epoch's or, until that is made, the current one; or None."""

@@ -22,9 +22,15 @@ from mavlink_bridge.wire.plan import Integers, WirePlan, quantise
 _MM = 1e-3
 
 
-def resting(epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: int) -> WirePlan:
-    """Return the plan to hold ``position`` (3,), m (rounded to the wire), from ``epoch`` (µs) on."""
-    return quantise(epoch, dt, position, np.zeros(3), np.zeros((steps, 3)), origin)
+def resting(
+    epoch: int, dt: int, steps: int, position: npt.ArrayLike, origin: int, *, column: bool = False
+) -> WirePlan:
+    """Return the plan to hold ``position`` (3,), m (rounded to the wire), from ``epoch`` (µs) on.
+
+    ``column``: the vehicle may be at any height.
+    """
+    plan = quantise(epoch, dt, position, np.zeros(3), np.zeros((steps, 3)), origin)
+    return plan._replace(column=column)
 
 
 def rests(plan: WirePlan) -> bool:
@@ -60,7 +66,7 @@ def committed_with_controls(start: WirePlan, accelerations: Array) -> tuple[Wire
     if not _rounded(start.velocity, np.ascontiguousarray(accelerations), rounded):
         raise CertificateError("an acceleration is not finite")
     knots: tuple[Integers, ...] = tuple((x, y, z) for x, y, z in rounded.tolist())
-    plan = WirePlan(start.epoch, start.dt, start.position, start.velocity, knots, start.origin)
+    plan = WirePlan(*start[:4], knots, *start[5:])
     return plan, _controls_of(plan, rounded)
 
 

@@ -10,8 +10,9 @@ from math import hypot, sqrt
 import numpy as np
 
 from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.columns import levelled
 from companion.avoidance.certified.committed import horizon_of
-from companion.avoidance.certified.margins import beside, between, fastest, margin
+from companion.avoidance.certified.margins import beside, between, fastest, further, margin
 from companion.avoidance.certified.noncooperative import NonCooperative
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.separating_planes import Others
@@ -42,6 +43,7 @@ class ConstraintSources:
         own = config.certified
         self.between = between(own, config.field, config.limits)
         """Least distance (m) between two plans."""
+        self._further = further(own)
         self._margin = margin(own, config.field, config.limits)
         self._beside = beside(own, config.field, config.limits)
         self._silent_us = config.guard.neighbour_lost_us
@@ -72,13 +74,13 @@ class ConstraintSources:
             *self._noncooperative.target(now, begins, view),
         ]
         sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
-        ends = [filed.controls[-1, 2] for filed in left.values()]
-        landed = [*ends, *(place for system, (_, place, _) in aside.items() if system not in taken_over)]
-        final = [last.later(begins, self._steps) for last in left.values()]
+        lasts = list(left.values())
+        beside_plans = [place for system, (_, place, _) in aside.items() if system not in taken_over]
         unshared: list[tuple[Array, Array | float]] = [
-            *((plan, self.between) for plan in final),
+            *(self._final_constraint(own, last, begins) for last in lasts),
             *self._fixed_constraints(own),
-            *self._landed_constraints(own, landed),
+            *(self._landed_constraint(own, last.controls[-1, 2], self._from_last(last)) for last in lasts),
+            *(self._landed_constraint(own, place, self.between) for place in beside_plans),
             *noncooperative,
             *(self._sensed_constraints(sensed) if sensed.ids else ()),
         ]
@@ -86,6 +88,10 @@ class ConstraintSources:
         bases = [pair.own.later(begins, n) for pair in agreed] + [own] * len(unshared)
         controls = [pair.other.later(begins, n) for pair in agreed] + [centres for centres, _ in unshared]
         distance = np.full((len(bases), n), self.between)
+        for index, pair in enumerate(agreed):
+            if pair.columns:
+                controls[index] = levelled(controls[index], bases[index])
+                distance[index] += pair.columns * self._further
         for index, (_, radii) in enumerate(unshared, count):
             distance[index] = radii
         others = Others(_stacked(bases, n), _stacked(controls, n), distance, np.arange(len(bases)) < count)
@@ -140,17 +146,22 @@ class ConstraintSources:
                 found[system] = off, position, now - time <= self._silent_us
         return found
 
-    def _landed_constraints(self, own: Array, places: list[Array]) -> list[tuple[Array, float]]:
-        """Return constraints at ``places`` (3,) of vehicles that said farewell, descending or on the ground.
+    def _from_last(self, last: StoredPlan) -> float:
+        """Return the least distance (m) from the ``last`` plan of a vehicle that said farewell."""
+        return self.between + last.plan.column * self._further
 
-        No vehicle flies over them: heights do not count.
+    def _final_constraint(self, own: Array, last: StoredPlan, begins: int) -> tuple[Array, float]:
+        """Return the constraint of the ``last`` plan of a vehicle that said farewell, while it is flown."""
+        plan = last.later(begins, self._steps)
+        centres = levelled(plan, own) if last.plan.column else plan
+        return centres, self._from_last(last)
+
+    def _landed_constraint(self, own: Array, place: Array, least: float) -> tuple[Array, float]:
+        """Return the constraint at the ``place`` (3,), m, of a vehicle that lands or has landed.
+
+        No vehicle flies over it within ``least`` (m): heights do not count.
         """
-        found = []
-        for place in places:
-            centres = own.copy()
-            centres[..., :2] = place[:2]
-            found.append((centres, self.between))
-        return found
+        return levelled(np.broadcast_to(place, own.shape), own), least
 
     def resting(self, epoch: int, heights: tuple[float, float], agreements: Agreements) -> list[Discs]:
         """Return the discs that a way must avoid from ``epoch`` (µs) on; then those that stay for ever alone.
@@ -163,11 +174,14 @@ class ConstraintSources:
         for one in self._config.obstacles:
             above = 0.0 if isinstance(one, Post) else max(one.at[2] - high, low - one.at[2], 0.0)
             fixed.append((one.at[:2], self._config.field.d_min + one.radius + self._margin, above))
-        landed = [(tuple(last.controls[-1, 2, :2]), self.between, 0.0) for last in agreements.left.values()]
+        landed = [
+            (tuple(last.controls[-1, 2, :2]), self._from_last(last), 0.0) for last in agreements.left.values()
+        ]
         vehicles = []
         for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():
             if system not in agreements.left:
-                above = 0.0 if self._config.planar else max(end[2] - high, low - end[2], 0.0)
+                level = self._config.planar or system in agreements.columns
+                above = 0.0 if level else max(end[2] - high, low - end[2], 0.0)
                 vehicles.append((tuple(end[:2]), self.between, above))
         return [_discs(fixed + landed + vehicles), _discs(fixed + landed)]
 

@@ -22,7 +22,7 @@ from zlib import crc32
 from companion.config import CompanionConfig
 from mavlink_bridge.frames import FleetFrame
 
-_RULES = 1
+_RULES = 2
 """Version of the rules of agreements and planes."""
 _NANO, _MICRO = 1e9, 1e6
 """Units of angles (1e-9 °: 0.1 mm), and of lengths, speeds and k (1e-6 of the SI unit)."""
@@ -49,7 +49,8 @@ def fingerprint(config: CompanionConfig, frame: FleetFrame) -> int:
     """Return the 32-bit fingerprint of the common settings."""
     certified, field, limits = config.certified, config.field, config.limits
     origin = frame.latitude * _NANO, frame.longitude * _NANO, frame.altitude * _MICRO
-    lengths = field.d_min, certified.tube, certified.sigmas, field.position_sigma, *limits.v_max
+    estimate = certified.sigmas, field.position_sigma
+    lengths = field.d_min, certified.tube, certified.drift, *estimate, *limits.v_max
     numbers = [
         _RULES,
         *(round(number) for number in origin),

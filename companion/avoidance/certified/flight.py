@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 import numpy as np
 
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.clocks import ClockWatch
+from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.commitment import Commitment, HoldReason
+from companion.avoidance.certified.committed import rest_time
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.detour import Detour, Subgoal
 from companion.avoidance.certified.fingerprint import identity
+from companion.avoidance.certified.margins import beside, further
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.qp import Objective, SeparationQp
-from companion.avoidance.certified.separating_planes import apart, keeps
+from companion.avoidance.certified.reservation import Reservation
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
@@ -45,19 +50,20 @@ class CertifiedFlight:
         )
         self._sources = ConstraintSources(config, steps)
         self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
-        between, planar = self._sources.between, config.planar
-        distance = np.full((1, steps + 1), between)
+        between = self._sources.between
+        distances = Distances(between, further(certified), steps, planar=config.planar)
         self.agreements = Agreements(
             own.system,
             certified,
             steps,
             identity(config, fleet),
-            Geometry(
-                lambda newest, one, other: keeps(newest, one, other, distance, upright=planar),
-                lambda one, other: apart(one, other, between, upright=planar),
-            ),
+            Geometry(distances.keeps, distances.apart),
+        )
+        self.reservation = Reservation(
+            certified, self.commitment, self.agreements, beside(certified, config.field, config.limits)
         )
         self.clocks = ClockWatch(own, certified.clock_us)
+        self._column_within = max(config.guard.tube, certified.drift)
         self._replies: list[Timesync] = []
         self._seconds: Array = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
         self._steps = steps
@@ -94,8 +100,9 @@ class CertifiedFlight:
         """While not in control, continue the committed plan, or hold ``position`` (3,), m.
 
         The committed plan continues if the vehicle is within ``certified.tube`` (m) of it, or if it is
-        announced for this epoch or a later one, because others rely on it. Otherwise a plan at rest at
-        ``position`` begins, which is not announced before the companion is in control; ``anchored_anew``
+        announced for this epoch or a later one, because others rely on it. A column continues at the height
+        of ``position``, unless another controller has flown the vehicle far from it. Otherwise a plan at rest
+        at ``position`` begins, which is not announced before the companion is in control; ``anchored_anew``
         counts this if a plan had been announced.
         """
         self._polled_at = now
@@ -103,13 +110,70 @@ class CertifiedFlight:
         commitment, horizon = self.commitment, self.commitment.horizon()
         if horizon is not None:
             difference = horizon.at(now).position - position
+            if commitment.column:
+                commitment.hover(position[2])
+                if hypot(difference[0], difference[1]) <= self._column_within:
+                    self._hold_column(now)
+                    return
             inside = float(difference @ difference) <= self._config.certified.tube**2
-            if inside or commitment.announced_until >= commitment.epoch(now):
+            if inside or (commitment.announced_until >= commitment.epoch(now) and not commitment.column):
                 commitment.turn(now)
                 return
         self.agreements.begin(commitment.begin(now, position))
         commitment.anchored_anew += self._announced
         self._in_control = self._announced = False
+
+    def park(self, now: int, measured: Motion, *, joins: bool, climbs: bool = False) -> None:
+        """Hold the column of a vehicle that stands on the ground, or ``climbs`` by its autopilot.
+
+        ``joins``: it is to take off; otherwise it is parked, and ``messages`` must say farewell.
+        """
+        if climbs:
+            self.watch(now, measured)
+        else:
+            self.reservation.begin(now, measured.position, joins=joins)
+        if self.reservation.joined:
+            self._hold_column(now)
+        else:
+            self._in_control = False
+            self.commitment.turn(now)
+
+    def lower(self, now: int) -> bool:
+        """Make the committed plan a column, carried on, for the landing; return False if it is to fly on.
+
+        That is where another's plan is too near.
+        """
+        room = self.reservation.has_room()
+        if room:
+            self._hold_column(now)
+        return room
+
+    def leave_column(self, now: int, measured: Motion, *, flies: bool) -> None:
+        """Make the column a plan in space again, at the height of the vehicle.
+
+        That is once the autopilot reports that it ``flies``, neither takes off nor lands, the vehicle is
+        within its tube, and each member has an agreement.
+        """
+        commitment = self.commitment
+        commitment.hover(measured.position[2])
+        horizon = commitment.horizon()
+        if self._hold_column(now) and horizon is not None and flies and not self.agreements.missing():
+            off = horizon.at(now).position - measured.position
+            inside = float(off @ off) <= self._config.certified.tube**2
+            if inside and now >= rest_time(horizon):
+                commitment.leave_column()
+
+    def _hold_column(self, now: int) -> bool:
+        """Continue the plan, as a column; return whether the plan of the next epoch was made now."""
+        self._polled_at, self._in_control = now, True
+        self.agreements.rejoin()
+        turned = self.commitment.turn(now)
+        if not (turned and self.commitment.unannounced):
+            self._agree(now)
+        if turned:
+            self.commitment.raise_column()
+        self.reservation.watch(now)
+        return turned
 
     def due(self, now: int) -> bool:
         """Begin the next epoch if it is time; return True if ``plan`` is to be called for it now.
@@ -121,6 +185,7 @@ class CertifiedFlight:
         """
         self._polled_at, self._in_control = now, True
         self.agreements.rejoin()
+        self.reservation.watch(now)
         turned = self.commitment.turn(now)
         if not (turned and self.commitment.unannounced):
             self._agree(now)
@@ -160,9 +225,13 @@ class CertifiedFlight:
         if horizon is None:
             return
         difference = horizon.at(now).position - measured.position
+        certified, current = self._config.certified, self.commitment.current
+        within = certified.tube
+        if current is not None and current.column:
+            difference[2], within = 0.0, max(certified.tube, certified.drift)
         self.deviation = float(np.sqrt(difference @ difference))
         self.largest_deviation = max(self.largest_deviation, self.deviation)
-        outside = max(0.0, self.deviation - self._config.certified.tube)
+        outside = max(0.0, self.deviation - within)
         self.left_tube += outside > 0.0 and not self._outside
         self._outside = outside
 

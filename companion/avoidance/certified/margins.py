@@ -34,6 +34,15 @@ def between(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -
     return field.d_min + 2.0 * margin(config, field, limits)
 
 
+def further(config: CertifiedConfig) -> float:
+    """Return by how much further (m) than from a plan in space others keep from a column.
+
+    A vehicle that its autopilot takes off or lands is within ``certified.drift`` of the axis, otherwise
+    within the tube of its plan.
+    """
+    return max(0.0, config.drift - config.tube)
+
+
 def beside(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
     """Return how far (m) from the end of its plan a vehicle at rest there may report its position.
 

@@ -14,6 +14,7 @@ from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan
 from companion.values.horizon import Array
+from mavlink_bridge.wire.plan import WirePlan
 
 _MOST_KEPT = 5
 """Number of agreements of a pair with which nothing is proposed any more."""
@@ -23,16 +24,20 @@ _OVERDUE = 0.5
 _LATE_US = 2_000_000
 """Age (µs) from which on a plan of an offer that has not been received is not expected any more."""
 
+_CLEAR = 256
+"""Number of results of ``Negotiation.clear`` that are kept."""
+
 
 class Geometry(NamedTuple):
     """Tests of plans, which are control points (n + 1, 3, 3), m, on the same knots.
 
     ``keeps``: whether the first plan keeps the own side of the planes of a pair of plans, the own and the
-    other. ``apart``: whether two plans are the least distance apart.
+    other. ``apart``: whether two plans are the least distance apart. Both take the number of columns among
+    the pair of plans, see ``columns.Distances``.
     """
 
-    keeps: Callable[[Array, Array, Array], bool]
-    apart: Callable[[Array, Array], bool]
+    keeps: Callable[[Array, Array, Array, int], bool]
+    apart: Callable[[Array, Array, int], bool]
 
 
 class AgreedPlans(NamedTuple):
@@ -41,12 +46,18 @@ class AgreedPlans(NamedTuple):
     own: StoredPlan
     other: StoredPlan
 
+    @property
+    def columns(self) -> int:
+        """Number of columns among the two plans."""
+        return self.own.plan.column + self.other.plan.column
+
 
 class Negotiation:
     """Negotiation of one vehicle with each of its peers; ``plans``: its own, of ``steps`` knots each."""
 
     def __init__(self, plans: PlanFile, steps: int, geometry: Geometry) -> None:
         self._plans, self._steps, self._geometry = plans, steps, geometry
+        self._clear: dict[tuple[WirePlan, WirePlan], bool] = {}
 
     def advance(self, now: int, peer: Peer, newest: StoredPlan, since: int) -> None:
         """Take an offer of ``peer`` that the ``newest`` own plan keeps, or propose or refuse one.
@@ -105,7 +116,30 @@ class Negotiation:
         waiting = peer.waiting(now)
         if waiting is not None and waiting <= _OVERDUE * peer.round_trip:
             return False
-        return self._apart(peer, plans)
+        return self._apart(peer, plans) and self._reservable(newest=plans.own, plans=plans)
+
+    def _reservable(self, newest: StoredPlan, plans: AgreedPlans) -> bool:
+        """Return whether columns permit an agreement on these plans.
+
+        The two must be apart horizontally, because planes between nearer ones would keep only their distance.
+        And a vehicle whose ``newest`` plan is a column agrees on no plan in space that it made before.
+        """
+        if newest.plan.column and not plans.own.plan.column:
+            return False
+        return not plans.columns or self.clear(*plans)
+
+    def clear(self, one: StoredPlan, other: StoredPlan) -> bool:
+        """Return whether two plans are the least distance apart from the beginning of the later one on."""
+        names = one.plan, other.plan
+        known = self._clear.get(names)
+        if known is None:
+            epoch, rows = max(one.plan.epoch, other.plan.epoch), self._steps + 1
+            columns = one.plan.column + other.plan.column
+            known = self._geometry.apart(one.later(epoch, rows), other.later(epoch, rows), columns)
+            if len(self._clear) >= _CLEAR:
+                self._clear.clear()
+            self._clear[names] = known
+        return known
 
     def _taken_in_time(self, newest: StoredPlan, one: Agreement, plans: AgreedPlans) -> bool:
         """Return whether the ``newest`` own plan, and the one that is flown until it begins, keep ``one``.
@@ -113,7 +147,7 @@ class Negotiation:
         The peer may replan on this agreement alone, and by a clock that is behind.
         """
         epoch = newest.plan.epoch
-        if not self._kept(newest, plans, epoch):
+        if not (self._kept(newest, plans, epoch) and self._reservable(newest, plans)):
             return False
         flown = self._plans.before(epoch - 1)
         begins = epoch if flown is None else max(flown.plan.epoch, one.epoch)
@@ -141,13 +175,19 @@ class Negotiation:
         if not peer.contradicted:
             return True
         rows = self._steps + 1
-        return self._geometry.apart(plans.own.later(epoch, rows), plans.other.later(epoch, rows))
+        return self._geometry.apart(
+            plans.own.later(epoch, rows), plans.other.later(epoch, rows), plans.columns
+        )
 
     def _same(self, before: AgreedPlans, after: AgreedPlans) -> bool:
         """Return whether both plans of an agreement are the earlier ones, carried on."""
         epoch = max(after.own.plan.epoch, after.other.plan.epoch)
         return all(
-            one is two or bool((one.later(epoch, self._steps) == two.later(epoch, self._steps)).all())
+            one is two
+            or (
+                one.plan.column == two.plan.column
+                and bool((one.later(epoch, self._steps) == two.later(epoch, self._steps)).all())
+            )
             for one, two in zip(before, after, strict=True)
         )
 
@@ -158,4 +198,5 @@ class Negotiation:
         all rest in the last of the n + 1 segments.
         """
         rows = self._steps + 1
-        return self._geometry.keeps(*(one.later(epoch, rows) for one in (plan, *plans)))
+        newest, own, other = (one.later(epoch, rows) for one in (plan, *plans))
+        return self._geometry.keeps(newest, own, other, plans.columns)

@@ -115,7 +115,9 @@ class Told:
         for sender, plan in speak.items():
             last = self._last.get(sender)
             goes_on = None if last is None else carried_on(last, (plan.epoch - last.epoch) // DT)
-            if goes_on is None or (plan.position, plan.velocity) != (goes_on.position, goes_on.velocity):
+            axes = 2 if goes_on is not None and goes_on.column and not plan.column else 3
+            begins = plan.position[:axes], plan.velocity
+            if goes_on is None or begins != (goes_on.position[:axes], goes_on.velocity):
                 self._since[sender] = plan.epoch
             self._last[sender] = plan
         for again in (False, True):

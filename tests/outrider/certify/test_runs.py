@@ -14,11 +14,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.avoidance.certified import flight
+from companion.avoidance.certified import columns
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.negotiation import AgreedPlans
 from companion.avoidance.certified.pair import Agreement, Pair
 from companion.avoidance.certified.peer_plans import StoredPlan
+from companion.avoidance.certified.reservation import Reservation
 from mavlink_bridge.messages import Message, Tunnel
 from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
@@ -326,7 +327,7 @@ def without_agreements(patch: pytest.MonkeyPatch) -> None:
 
 def without_refusals(patch: pytest.MonkeyPatch) -> None:
     """What the peer has proposed is taken, whether or not the own plan keeps it."""
-    patch.setattr(flight, "keeps", lambda *_, **__: True)
+    patch.setattr(columns, "keeps", lambda *_, **__: True)
 
 
 def withdrawn_unconsidered(patch: pytest.MonkeyPatch) -> None:
@@ -371,6 +372,23 @@ def test_companions_that_break_a_rule_are_found(
             assert not verdict.certified
             return
     pytest.fail("twenty flights were certified")
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_a_take_off_and_a_landing_without_waiting_are_found(
+    waits: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nobody hears anybody."""
+    options = CERTIFIED
+    if not waits:
+        monkeypatch.setattr(Reservation, "missing", lambda self, now: "")
+        options = CERTIFIED._replace(loss=1.0)
+    run = fly(tmp_path / "run", 2, airborne=False, cap_s=0.5, options=options)
+    verdict = judge(read(run, lambda _what, _share: None))
+    found = {finding.what for finding in verdict.findings}
+    both = {"a climb without a reservation", "a descent without a reservation"}
+    assert found == (set() if waits else both)
+    assert verdict.pairs.farewell == 0 or not waits
 
 
 def test_who_replans_without_the_other_s_plan_is_found(

@@ -99,9 +99,14 @@ def _weaker(
     for one in listed:
         epoch, (mine, others) = max(one.agreement), one.agreement
         apart = points.later(one.owner, mine, epoch) - points.later(one.peer, others, epoch)
-        if terms.upright:
+        columns = points.columns(one)
+        if terms.upright or columns:
             apart[..., 2] = 0.0
         distance = float(hull_distance(apart).min())
+        required = terms.required + columns * terms.further
+        if columns and distance < required - SLACK:
+            figures = f"{distance:.6f} m, at least {required:.6f} m"
+            findings.append(_finding("an agreement too near a column", one, one.first, figures))
         runs = bisect(begins[one.owner], mine), bisect(begins[one.peer], others)
         name = one.owner, one.peer, *runs
         if distance < keeps[name] - SLACK:
@@ -125,6 +130,11 @@ class _Points:
     def __contains__(self, name: tuple[int, int]) -> bool:
         return name in self._plans
 
+    def columns(self, one: Listing) -> int:
+        """Return the number of columns among the two plans of an agreement."""
+        names = (one.owner, one.agreement[0]), (one.peer, one.agreement[1])
+        return sum(self._plans[name].column for name in names)
+
     def later(self, system: int, begins: int, epoch: int) -> Array:
         """Return control points (rows, 3, 3), m, from ``epoch`` (µs) on, of the plan that ``begins`` (µs)."""
         name = system, begins
@@ -142,10 +152,11 @@ def _beyond(points: _Points, system: int, epoch: int, listed: Sequence[Listing],
     plan = points.later(system, epoch, epoch)
     own = np.stack([points.later(system, one.agreement[0], epoch) for one in listed])
     relative = own - np.stack([points.later(one.peer, one.agreement[1], epoch) for one in listed])
-    if terms.upright:
-        relative[..., 2] = 0.0
+    columns = np.array([points.columns(one) for one in listed])
+    relative[(columns > 0) | terms.upright, ..., 2] = 0.0
     normals = nearest(relative.reshape(-1, 3, 3)).reshape(*relative.shape[:2], 1, 3)
-    room = 0.5 * np.maximum((normals * relative).sum(axis=-1) - terms.required, 0.0)
+    required = (terms.required + columns * terms.further)[:, None, None]
+    room = 0.5 * np.maximum((normals * relative).sum(axis=-1) - required, 0.0)
     short: Array = (normals * (own - plan)).sum(axis=-1) - room
     found: list[float] = short.max(axis=(1, 2)).tolist()
     return found

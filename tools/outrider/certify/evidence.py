@@ -16,7 +16,8 @@ class Terms(NamedTuple):
     obstacles, whose plans are not judged. ``dt``: time between knots (µs); ``epoch``: time between plans
     (µs); ``steps``: number of knots of a plan; ``fleet_identity``: fingerprints in plans and statements;
     ``required``: least distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²);
-    ``upright``: whether only horizontal distances count.
+    ``upright``: whether only horizontal distances count; ``further``: what each column adds to the least
+    distance (m).
     """
 
     fleet: tuple[int, ...]
@@ -28,6 +29,7 @@ class Terms(NamedTuple):
     required: float
     a_max: Integers
     upright: bool
+    further: float = 0.0
 
 
 class LoggedPlan(NamedTuple):
@@ -58,6 +60,17 @@ class LoggedStatement(NamedTuple):
     number: int
 
 
+class Order(NamedTuple):
+    """Order of the companion to its autopilot to take off or to land, at ``time`` (µs, the owner's clock).
+
+    ``climbs``: the order is to take off. ``number``: number of the record in the log.
+    """
+
+    time: int
+    climbs: bool
+    number: int
+
+
 class UnreadablePayloads(NamedTuple):
     """Payloads of the type of plans or statements that cannot be read.
 
@@ -80,7 +93,8 @@ class FarewellChange(NamedTuple):
 class Log(NamedTuple):
     """Contents of one vehicle's tlog.
 
-    ``statements``: in the order of the log. ``damaged``: number of records that could not be read.
+    ``statements`` and ``orders``: in the order of the log; of a repeated order the first. ``damaged``: number
+    of records that could not be read.
     """
 
     owner: int
@@ -89,6 +103,7 @@ class Log(NamedTuple):
     garbled: tuple[UnreadablePayloads, ...]
     words: tuple[FarewellChange, ...]
     damaged: int
+    orders: tuple[Order, ...] = ()
 
 
 class Evidence(NamedTuple):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import between
+from companion.avoidance.certified.margins import between, further
 from outrider.certify.evidence import Terms
 from outrider.errors import Fault, InputError
 from outrider.runs import names
@@ -88,4 +88,5 @@ def _terms(config: FlyConfig) -> Terms:
         between(certified, companion.field, companion.limits),
         (x, y, z),
         companion.planar,
+        further(certified),
     )

@@ -159,14 +159,25 @@ def _steps(plans: Sequence[WirePlan], leaves: Sequence[Absence]) -> Iterable[Ste
         if last is None or plan.epoch in back:
             kind = Kind.FIRST
         else:
-            goes_on = carried_on(last, (plan.epoch - last.epoch) // plan.dt)
-            if plan == goes_on:
-                kind = Kind.CARRIED_ON
-            else:
-                continued = (plan.position, plan.velocity) == (goes_on.position, goes_on.velocity)
-                kind = Kind.MADE if continued else Kind.ANCHOR
+            kind = _relation(carried_on(last, (plan.epoch - last.epoch) // plan.dt), plan)
         last = plan
         yield Step(plan, kind)
+
+
+def _relation(goes_on: WirePlan, plan: WirePlan) -> Kind:
+    """Return the relation of ``plan`` to the plan before, which ``goes_on`` is, carried on.
+
+    Any plan may become a column. A column at rest may become a plan at any height.
+    """
+    if plan == goes_on._replace(column=plan.column) and plan.column >= goes_on.column:
+        return Kind.CARRIED_ON
+    leaves = goes_on.column and not plan.column
+    if leaves and any(map(any, (goes_on.velocity, *goes_on.accelerations))):
+        return Kind.ANCHOR
+    axes = 2 if leaves else 3
+    begins = goes_on.position[:axes], goes_on.velocity
+    made = plan.column == goes_on.column or leaves
+    return Kind.MADE if made and (plan.position[:axes], plan.velocity) == begins else Kind.ANCHOR
 
 
 def _limits(system: int, step: Step, terms: Terms) -> Iterable[Finding]:

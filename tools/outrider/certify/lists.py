@@ -20,8 +20,9 @@ from itertools import chain, pairwise
 from typing import NamedTuple
 
 from mavlink_bridge.wire.agreements import Entry, Epochs, Statement
-from outrider.certify.evidence import Finding, Log, LoggedPlan, LoggedStatement, Terms
+from outrider.certify.evidence import Finding, Log, LoggedPlan, LoggedStatement, Order, Terms
 from outrider.certify.histories import History, Kind
+from outrider.certify.reservations import Reservations
 
 _NONE: Epochs = (0, 0)
 
@@ -42,13 +43,15 @@ class _Peer:
     def __init__(self, owner: int, system: int) -> None:
         self._owner, self.system = owner, system
         self.listings: dict[Epochs, Listing] = {}
-        self._listed: tuple[Epochs, ...] = ()
+        self.listed: tuple[Epochs, ...] = ()
         self._considered = _NONE
         self._own_since = self._since = 0
         self._stated: set[Epochs] = set()
         self._lacking: list[tuple[int, Epochs, frozenset[Epochs]]] = []
         """Received: epoch of the statement, the newest considered agreement, and the list."""
         self._plans: set[int] = set()
+        self._departed = False
+        """Whether the last own entry says that the peer's farewell is accepted."""
         self._left = False
         """Whether the owner has said farewell and has not begun anew."""
         self._farewell: int | None = None
@@ -93,7 +96,8 @@ class _Peer:
                 # The farewells from before the own one do not count any more.
                 self._left, self._farewell = False, None
         self._left |= statement.farewell
-        before, now = set(self._listed), set(entry.agreements)
+        self._departed = entry.departed
+        before, now = set(self.listed), set(entry.agreements)
         for one in entry.agreements:
             if one not in before:
                 yield from self._enters(statement, one)
@@ -101,10 +105,10 @@ class _Peer:
                     one, Listing(self._owner, self.system, one, statement.epoch, statement.epoch)
                 )
             self.listings[one] = self.listings[one]._replace(last=statement.epoch)
-        for one in self._listed:
+        for one in self.listed:
             if one not in now and not self._leaves(one, entry):
                 yield "an agreement dropped", self._named(one)
-        self._listed = entry.agreements
+        self.listed = entry.agreements
         self._considered = max(self._considered, entry.considered, *entry.agreements, key=self._rank)
         if entry.departed and self._farewell is None:
             yield "a departure without a farewell", ""
@@ -133,9 +137,14 @@ class _Peer:
         )
 
     @property
+    def departed(self) -> bool:
+        """Whether the peer's farewell is accepted, or was to be."""
+        return self._departed or self._farewell is not None
+
+    @property
     def agreed(self) -> bool:
         """Whether an agreement of the own list was stated by the peer, and is not void."""
-        return any(one in self._stated and not self._void(one) for one in self._listed)
+        return any(one in self._stated and not self._void(one) for one in self.listed)
 
     def _named(self, one: Epochs) -> str:
         return f"on plans of {one[0]} µs and {one[1]} µs"
@@ -160,10 +169,14 @@ def listings(
     }
     findings: list[Finding] = []
     farewell: int | None = None
-    records: list[LoggedPlan | LoggedStatement] = sorted(
-        chain(log.sightings, log.statements), key=lambda record: record.number
+    reservations = Reservations(history, terms)
+    records: list[LoggedPlan | LoggedStatement | Order] = sorted(
+        chain(log.sightings, log.statements, log.orders), key=lambda record: record.number
     )
     for record in records:
+        if isinstance(record, Order):
+            findings += reservations.judge(record)
+            continue
         sender = record.sender
         if isinstance(record, LoggedPlan):
             if sender != owner and record.plan in sent.get(sender, ()):
@@ -200,6 +213,8 @@ def listings(
                 present.add(peer.system)
                 if not (entry.departed or statement.farewell or peer.agreed):
                     findings.append(Finding("a plan without an agreement", who, statement.epoch, ""))
+        if log.orders:
+            reservations.see(record.time, peers)
     for epoch, present in named.items():
         unnamed = sorted(set(terms.fleet) - present - {owner})
         if unnamed:

@@ -3,6 +3,10 @@
 They are computed from the hulls of the differences of the control points, so a bound also holds at all times
 between the knots.
 
+While the autopilot of one of the two takes it off or lands it, the distance is horizontal, without what each
+such vehicle adds to the least distance. A vehicle that lands in a column is checked for ever, at the place
+where its last plan ends.
+
 The bound of a pair is the smaller of the required distance and the pair's largest distance so far; the first
 distance only sets the bound. After an anchor the bound is suspended until plans of the two in a later epoch
 are at least the required distance apart.
@@ -21,6 +25,7 @@ from companion.avoidance.certified.separating_planes import hull_distance
 from companion.values.horizon import Array
 from mavlink_bridge.wire.plan import WirePlan
 from outrider.certify.evidence import Finding, Terms
+from outrider.certify.heights import Span, within
 from outrider.certify.histories import History, Kind
 
 SLACK = 1e-6
@@ -92,8 +97,12 @@ class _Pair:
         self._breach = None
 
 
-def check(histories: Sequence[History], terms: Terms) -> Pairs:
-    """Check all pairs of ``histories`` at all epochs."""
+def check(histories: Sequence[History], terms: Terms, spans: Sequence[tuple[Span, ...]] = ()) -> Pairs:
+    """Check all pairs of ``histories`` at all epochs.
+
+    ``spans``: for each history, when the vehicle's autopilot decides on its height.
+    """
+    spans = spans or [()] * len(histories)
     plans = [{step.plan.epoch: step for step in history.steps} for history in histories]
     epochs = tuple(sorted({epoch for sent in plans for epoch in sent}))
     current: dict[int, WirePlan] = {}
@@ -109,12 +118,17 @@ def check(histories: Sequence[History], terms: Terms) -> Pairs:
                 current[k] = step.plan
                 if step.kind is Kind.ANCHOR:
                     anchored.add(k)
-        there = [k for k in sorted(current) if not histories[k].left(epoch)]
+        decides = {k for k in current if within(spans[k], epoch, epoch + terms.epoch)}
+        there = [
+            k for k in sorted(current) if not histories[k].left(epoch) or (k in decides and current[k].column)
+        ]
         together = list(combinations(there, 2))
         farewell += len(current) * (len(current) - 1) // 2 - len(together)
         # A vehicle that returns after a farewell starts anew with all others.
         findings += _concluded(pairs.pop(who) for who in set(pairs).difference(together))
-        for (i, j), distance in zip(together, _distances(current, epoch, together, terms), strict=True):
+        columns = [(i in decides) + (j in decides) for i, j in together]
+        distances = _distances(current, epoch, together, columns, terms)
+        for (i, j), distance in zip(together, distances, strict=True):
             who = histories[i].system, histories[j].system
             pair = pairs.setdefault((i, j), _Pair(who, terms.required))
             if not pair.see(epoch, distance, anchored=not anchored.isdisjoint((i, j))):
@@ -128,9 +142,16 @@ def check(histories: Sequence[History], terms: Terms) -> Pairs:
 
 
 def _distances(
-    current: dict[int, WirePlan], epoch: int, together: Sequence[tuple[int, int]], terms: Terms
+    current: dict[int, WirePlan],
+    epoch: int,
+    together: Sequence[tuple[int, int]],
+    columns: Sequence[int],
+    terms: Terms,
 ) -> list[float]:
-    """Return the least distance (m) of each pair of plans; a silent vehicle's last plan is carried on."""
+    """Return the least distance (m) of each pair of plans; a silent vehicle's last plan is carried on.
+
+    ``columns``: of how many vehicles of each pair the autopilot decides on the height.
+    """
     if not together:
         return []
     goes_on = {
@@ -138,10 +159,10 @@ def _distances(
     }
     points = {k: controls(plan) for k, plan in goes_on.items()}
     relative: Array = np.stack([points[i] - points[j] for i, j in together])
-    if terms.upright:
-        relative[..., 2] = 0.0
+    count = np.array(columns)
+    relative[(count > 0) | terms.upright, ..., 2] = 0.0
     distances = hull_distance(relative.reshape(-1, 3, 3)).reshape(len(together), -1)
-    least: list[float] = distances.min(axis=1).tolist()
+    least: list[float] = (distances.min(axis=1) - count * terms.further).tolist()
     return least
 
 

@@ -10,10 +10,11 @@ from pathlib import Path
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import between
+from companion.avoidance.certified.margins import between, further
+from companion.values.components import COMPONENT
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import Tunnel
+from mavlink_bridge.messages import CommandLong, Tunnel
 from mavlink_bridge.tlog.log import Record, read_tlog
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
@@ -28,6 +29,7 @@ from outrider.certify.evidence import (
     Log,
     LoggedPlan,
     LoggedStatement,
+    Order,
     Terms,
     UnreadablePayloads,
 )
@@ -113,6 +115,7 @@ def terms_of(scenario: Scenario) -> Terms:
         between(certified, config.field, limits),
         (x, y, z),
         config.planar,
+        further(certified),
     )
 
 
@@ -126,6 +129,7 @@ class _Tally:
         self._garbled: dict[int, UnreadablePayloads] = {}
         self._words: list[FarewellChange] = []
         self._statements: list[LoggedStatement] = []
+        self._orders: list[Order] = []
         self._ahead = 0
 
     def add(self, number: int, time: int, message: Tunnel) -> None:
@@ -142,6 +146,14 @@ class _Tally:
             self._plans[sender, payload] = first, copies + 1, at
         elif message.payload_type == AGREEMENTS and (sender, payload) not in self._received:
             self._state(number, time, sender, payload)
+
+    def order(self, number: int, time: int, message: CommandLong) -> None:
+        """Add a command of the companion to its autopilot; only take-off and landing count."""
+        climbs = message.command == mavlink.MAV_CMD_NAV_TAKEOFF
+        if not climbs and message.command != mavlink.MAV_CMD_NAV_LAND:
+            return
+        if not self._orders or self._orders[-1].climbs != climbs:
+            self._orders.append(Order(time + self._ahead, climbs, number))
 
     def _state(self, number: int, time: int, sender: int, payload: bytes) -> None:
         try:
@@ -180,7 +192,8 @@ class _Tally:
             except PlanWireError:
                 self._garble(sender, time, copies)
         garbled, words = tuple(self._garbled.values()), tuple(self._words)
-        return Log(self._owner, tuple(sightings), tuple(self._statements), garbled, words, damaged)
+        statements, orders = tuple(self._statements), tuple(self._orders)
+        return Log(self._owner, tuple(sightings), statements, garbled, words, damaged, orders)
 
 
 def _read(owner: int, paths: Sequence[Path], at: Callable[[int], None]) -> Log:
@@ -189,7 +202,13 @@ def _read(owner: int, paths: Sequence[Path], at: Callable[[int], None]) -> Log:
     Raises LogError.
     """
     tally, repeated = _Tally(owner), _Repeated()
-    codec = Codec(lambda identifier, _system, _component: identifier == mavlink.MAVLINK_MSG_ID_TUNNEL)
+    own = owner, COMPONENT
+    codec = Codec(
+        lambda identifier, system, component: (
+            identifier == mavlink.MAVLINK_MSG_ID_TUNNEL
+            or (identifier == mavlink.MAVLINK_MSG_ID_COMMAND_LONG and (system, component) == own)
+        )
+    )
     readers, size = [read_tlog(path) for path in paths], 0
     lags = [_LAG_US if is_of_backup(path) else 0 for path in paths]
     shifted = [_timed(reader, lag) for reader, lag in zip(readers, lags, strict=True)]
@@ -198,11 +217,14 @@ def _read(owner: int, paths: Sequence[Path], at: Callable[[int], None]) -> Log:
         if number % _RECORDS_PER_REPORT == 0:
             at(size)
         for message in codec.feed(record.frame):
-            if not isinstance(message, Tunnel):
+            if not isinstance(message, Tunnel | CommandLong):
                 continue
             if len(paths) > 1 and repeated(record.time, record.frame):
                 continue
-            tally.add(number, record.time, message)
+            if isinstance(message, CommandLong):
+                tally.order(number, record.time, message)
+            else:
+                tally.add(number, record.time, message)
     reports = [reader.report for reader in readers]
     return tally.log(sum(report.bad + report.truncated for report in reports) + codec.counters.bad)
 

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from outrider.certify import agreed_planes
 from outrider.certify.evidence import Evidence, Finding, Log, Terms
+from outrider.certify.heights import heights
 from outrider.certify.histories import History, Kind, history
 from outrider.certify.lists import Listing, listings
 from outrider.certify.pairs import Pairs, check
@@ -91,7 +92,7 @@ def judge(evidence: Evidence) -> Verdict:
         found, wrong = history(system, terms, logs)
         histories.append(found)
         findings += wrong
-    pairs = check(histories, terms)
+    pairs = check(histories, terms, heights(histories, logs))
     began = min(pairs.epochs, default=0)
     listed, wrong = _listed(histories, terms, logs)
     kept = agreed_planes.check(histories, listed, terms)

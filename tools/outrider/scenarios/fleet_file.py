@@ -79,6 +79,7 @@ class FleetFile(Settings):
     epoch_us: int = Field(gt=0, le=2_000_000, multiple_of=4)
     d_min: Positive
     tube: Positive
+    drift: Positive
     sigmas: float = Field(ge=0.0, le=6.0)
     position_sigma: float = Field(ge=0.0, le=5.0)
     clock_us: int = Field(ge=0, le=100_000)
@@ -138,6 +139,7 @@ def settings_of(config: CompanionConfig, origin: FleetOrigin, measured: Measurem
         epoch_us=certified.epoch_us,
         d_min=config.field.d_min,
         tube=certified.tube,
+        drift=certified.drift,
         sigmas=certified.sigmas,
         position_sigma=config.field.position_sigma,
         clock_us=certified.clock_us,
@@ -208,6 +210,7 @@ def _common(fleet: FleetFile) -> tuple[_Common, ...]:
         _Common(("certified", "epoch_us"), fleet.epoch_us),
         _Common(("field", "d_min"), fleet.d_min),
         _Common(("certified", "tube"), fleet.tube),
+        _Common(("certified", "drift"), fleet.drift),
         _Common(("certified", "sigmas"), fleet.sigmas),
         _Common(("field", "position_sigma"), fleet.position_sigma),
         _Common(("certified", "clock_us"), fleet.clock_us),

@@ -13,14 +13,14 @@ import numpy as np
 from companion.avoidance.certified.agreements import AgreedPlans
 from companion.avoidance.certified.committed import carried_on, controls, horizon_of, resting
 from companion.avoidance.certified.flight import CertifiedFlight
-from companion.avoidance.certified.margins import between
+from companion.avoidance.certified.margins import between, further
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.separating_planes import hull_distance, nearest
 from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
 from companion.config.certified import CertifiedConfig
 from companion.values.components import COMPONENT
-from companion.values.horizon import Array
+from companion.values.horizon import Array, Motion
 from companion.world import View, World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source, Tunnel
@@ -34,6 +34,8 @@ TICK = 20_000
 NEVER = 1 << 62
 EXACT = 1e-9
 """m."""
+CLIMB = 800_000
+"""µs."""
 _NOTHING = View(None, None, None, None)
 
 
@@ -60,7 +62,8 @@ class Habits(NamedTuple):
     """Of one vehicle, µs of the run: when it is switched on, when it steers from, when it leaves; when it is
     not called, and when it may not steer (from, till); how far its clock is ahead. Until it steers it wanders
     about its place by ``wanders`` m. When it ``returns`` it joins again where it is. When its companion
-    ``restarts`` it has forgotten everything, and begins anew where the vehicle is."""
+    ``restarts`` it has forgotten everything, and begins anew where the vehicle is. One that ``takes_off``
+    stands on the ground below its place before, and climbs for ``CLIMB``; one that ``lands`` stays down."""
 
     on: int = 0
     steers: int = 0
@@ -71,6 +74,8 @@ class Habits(NamedTuple):
     wanders: float = 0.0
     returns: int = NEVER
     restarts: int = NEVER
+    takes_off: int = -1
+    lands: int = NEVER
 
 
 class Made(NamedTuple):
@@ -109,6 +114,11 @@ class Vehicle:
         """Plans that it flew or told and that were not the one it had told or flown for that epoch."""
         self.inbox: list[tuple[int, int, Tunnel]] = []
         self.made: list[Made] = []
+        self.columns: list[list[int]] = []
+        """From when till when (µs since ``EPOCH`` by its clock) its autopilot alone decides on its height."""
+        self.slanted = False
+        """Whether it kept planes that are not upright when its autopilot began to decide on its height."""
+        self._handles = self._fly if habits.takes_off < 0 else self._stand
         self._begun: dict[int, int] = {}
 
     def _start(self) -> None:
@@ -137,7 +147,9 @@ class Vehicle:
         if leaving or within(since, self.habits.released):
             self._flying = False
         else:
-            self._fly(now, since, goal)
+            self._handles(now, since, goal)
+            standing_by = self._handles == self._stand and not flight.reservation.joined
+            leaving = standing_by or self._handles == self._sink
         messages = flight.messages(now, farewell=leaving)
         # Before its first plan, a companion that has restarted flies what the one before has told.
         first = flight.agreements.since if self._restarted else 0
@@ -146,7 +158,67 @@ class Vehicle:
                 self.contradictions += self.plans.setdefault(plan.epoch, plan) != plan
         return [message for message in messages if isinstance(message, Tunnel)]
 
+    def _at(self, height: float) -> Motion:
+        return Motion(np.array([*self.place[:2], height]), np.zeros(3), np.zeros(3))
+
+    def may_move(self, now: int) -> bool:
+        """Whether its autopilot may take it off or land it."""
+        return not self.flight.reservation.missing(now)
+
+    def _stand(self, now: int, since: int, goal: Array) -> None:
+        self.flight.park(now, self._at(0.0), joins=since >= self.habits.takes_off)
+        if self.flight.reservation.joined and self.may_move(now):
+            self._let_go(now)
+            self._handles = self._climb
+
+    def _climb(self, now: int, since: int, goal: Array) -> None:
+        self.flight.park(now, self._at(0.5 * self.place[2]), joins=True, climbs=True)
+        if now - EPOCH >= self.columns[-1][0] + CLIMB:
+            self.flight.stand(now, self.place)
+            self._flying, self._handles = True, self._level
+
+    def _level(self, now: int, since: int, goal: Array) -> None:
+        self.flight.leave_column(now, self._at(self.place[2]), flies=True)
+        if not self.flight.commitment.column:
+            step = self._config.certified.epoch_us
+            self.columns[-1][1] = now - EPOCH + step - now % step
+            self._handles = self._fly
+
+    def _lower(self, now: int, since: int, goal: Array) -> None:
+        if not self.flight.lower(now):
+            if self.flight.commitment.column:
+                self.flight.leave_column(now, self._flown(now), flies=True)
+            else:
+                self._steer(now, since, goal)
+        elif self.may_move(now):
+            self._let_go(now)
+            self._handles = self._sink
+
+    def _let_go(self, now: int) -> None:
+        self.columns.append([now - EPOCH, NEVER])
+        agreed = self.flight.agreements.agreed()
+        self.slanted |= not all(plans.own.plan.column for plans in agreed)
+
+    def _sink(self, now: int, since: int, goal: Array) -> None:
+        self._flying = False
+
+    def in_column(self, begin: int, end: int) -> bool:
+        """Whether its autopilot decides on its height at any time in between (µs since ``EPOCH``)."""
+        return any(one < end and begin < other for one, other in self.columns)
+
     def _fly(self, now: int, since: int, goal: Array) -> None:
+        if since >= self.habits.lands:
+            self._handles = self._lower
+            self._lower(now, since, goal)
+        else:
+            self._steer(now, since, goal)
+
+    def _flown(self, now: int) -> Motion:
+        horizon = self.flight.horizon()
+        assert horizon is not None
+        return horizon.at(now)
+
+    def _steer(self, now: int, since: int, goal: Array) -> None:
         flight, steers = self.flight, since >= self.habits.steers
         if not (self._flying and steers):
             flight.stand(now, self._here(now, since))
@@ -178,7 +250,8 @@ class Vehicle:
         """What it flies in ``epoch``, called or not: its last plan goes on."""
         if not self.plans:
             # Never steered, never said anything: it stands there.
-            return resting(epoch, DT, STEPS, self.place, FLEET.fingerprint)
+            place = self.place if self.habits.takes_off < 0 else self._at(0.0).position
+            return resting(epoch, DT, STEPS, place, FLEET.fingerprint)
         last = max((known for known in self.plans if known <= epoch), default=min(self.plans))
         plan = self.plans[last]
         return carried_on(plan, max(epoch - last, 0) // plan.dt)
@@ -206,6 +279,7 @@ class Swarm:
             task="goto", avoidance="certified", turning_sense="right", certified=certified, planar=planar
         )
         self.d = between(self.config.certified, self.config.field, self.config.limits)
+        self._further = further(self.config.certified)
         self.vehicles = [
             Vehicle(system, self._config_of(others or {}, system), np.array(place), habit)
             for system, place, habit in zip(fleet, starts, habits, strict=True)
@@ -287,15 +361,38 @@ class Swarm:
         return range(min(known), max(known) + 1, step)
 
     def least(self) -> float:
-        """The least distance (m) of any two plans as they are flown, by hulls and by places along them."""
-        steps = self.config.certified.epoch_us // self.config.certified.dt_us
+        """The least distance (m) of any two plans as they are flown, by hulls and by places along them.
+
+        The distance is horizontal where autopilots decide on heights, and what is added for each such vehicle
+        is not counted.
+        """
+        length = self.config.certified.epoch_us
+        steps = length // self.config.certified.dt_us
         least = np.inf
         for epoch in self.epochs():
-            flown = [controls(vehicle.plan(epoch))[:steps] for vehicle in self.vehicles]
-            pairs = np.concatenate([a - b for a, b in combinations(flown, 2)])
-            least = min(least, hull_distance(pairs).min())
-            least = min(least, np.linalg.norm(curves(pairs), axis=-1).min())
+            since = epoch - EPOCH
+            flown = [
+                (vehicle.in_column(since, since + length), controls(vehicle.plan(epoch))[:steps])
+                for vehicle in self.vehicles
+            ]
+            together = list(combinations(flown, 2))
+            pairs = np.stack([one - other for (_, one), (_, other) in together])
+            columns = np.array([one + other for (one, _), (other, _) in together])
+            pairs[columns > 0, ..., 2] = 0.0
+            more = np.repeat(self._further * columns, steps)
+            pairs = pairs.reshape(-1, 3, 3)
+            least = min(least, (hull_distance(pairs) - more).min())
+            least = min(least, (np.linalg.norm(curves(pairs), axis=-1).min(axis=-1) - more).min())
         return float(least)
+
+    def unflagged(self) -> bool:
+        """Whether an autopilot decides on a height in an epoch whose plan is no column."""
+        length = self.config.certified.epoch_us
+        return any(
+            vehicle.in_column(epoch - EPOCH, epoch - EPOCH + length) and not vehicle.plan(epoch).column
+            for vehicle in self.vehicles
+            for epoch in self.epochs()
+        )
 
     def crossed(self) -> float:
         """By how much (m) plans cross the planes of agreements that are kept, at most; negative if none does.
@@ -315,10 +412,20 @@ class Swarm:
             )
         )
         relative = own - other
+        columns = one.plans[kept.agreement.own].column + two.plans[kept.agreement.other].column
+        if columns:
+            relative[..., 2] = 0.0
         normals = nearest(relative)
-        gap = np.minimum(self.d, np.einsum("nk,nik->ni", normals, relative))
-        least = 0.5 * (np.einsum("nk,nik->ni", normals, own + other) + gap)
+        gap = np.minimum(self.d + columns * self._further, np.einsum("nk,nik->ni", normals, relative))
+        least = np.einsum("nk,nik->ni", normals, own) - 0.5 * (
+            np.einsum("nk,nik->ni", normals, relative) - gap
+        )
         return float((least - np.einsum("nk,nik->ni", normals, newest)).max())
+
+    @property
+    def exact(self) -> float:
+        """How exactly (m) distances are kept: two plans of an agreement on a column by 1 µm."""
+        return EXACT + 1e-6 * any(vehicle.columns for vehicle in self.vehicles)
 
     def abandoned(self) -> list[Made]:
         """Plans that were made beside an agreement with another that is known to have begun anew since."""
@@ -337,7 +444,9 @@ class Swarm:
     def faults(self) -> list[str]:
         """What breaks the theorem, or a law that it follows from, in this run; each by its name."""
         found = {
-            "separation": self.least() < self.d - EXACT,
+            "separation": self.least() < self.d - self.exact,
+            "a height without a column": self.unflagged(),
+            "a height beside slanted planes": any(vehicle.slanted for vehicle in self.vehicles),
             "no agreement in common": bool(self.parted),
             "other plans than those that are flown": bool(self.mistaken),
             "a plan crosses a plane": self.crossed() > EXACT,

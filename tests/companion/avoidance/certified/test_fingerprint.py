@@ -42,6 +42,7 @@ COMMON: dict[str, dict[str, Any]] = {
     "heights": {"planar": True},
     "d_min": {"field": {"d_min": 0.5001}},
     "tube": {"certified": {"tube": 0.2501}},
+    "drift": {"certified": {"drift": 0.5001}},
     "k": {"certified": {"sigmas": 3.001}},
     "sigma": {"field": {"position_sigma": 0.0201}},
     "speed": {"limits": {"v_max": [5.0, 5.001, 4.0]}},

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.committed import committed, resting
 from companion.avoidance.certified.fingerprint import FleetIdentity
 from companion.avoidance.certified.negotiation import Geometry
-from companion.avoidance.certified.separating_planes import apart, keeps
 from companion.config.certified import CertifiedConfig
 from companion.values.horizon import Array
 from mavlink_bridge.wire.agreements import Entry, Statement
@@ -19,11 +17,7 @@ OWN, OTHER, THIRD = 1, 2, 3
 FRAME = 0xABCDEF07
 LENGTH = 200_000
 NOW = EPOCH + 30_000
-DISTANCE = np.full((1, STEPS + 1), 1.0)
-
-
-def kept_apart(newest: Array, own: Array, other: Array) -> bool:
-    return keeps(newest, own, other, DISTANCE)
+DISTANCES = Distances(1.0, 0.25, STEPS)
 
 
 def agreements(own: int = OWN, *expected: int) -> Agreements:
@@ -33,7 +27,7 @@ def agreements(own: int = OWN, *expected: int) -> Agreements:
         config,
         STEPS,
         FleetIdentity(FRAME, FRAME & 0xFF),
-        Geometry(kept_apart, lambda a, b: apart(a, b, 1.0)),
+        Geometry(DISTANCES.keeps, DISTANCES.apart),
     )
     one.begin(EPOCH)
     return one

@@ -1,0 +1,108 @@
+"""Reservation of a column of air, before the autopilot takes the vehicle off and before it lands it.
+
+On the ground a vehicle is *parked*: it says farewell with a plan that is its column, so that others keep
+clear of its place and need nothing of it. When it is to take off it *joins*: it withdraws the farewell, and
+climbs once the column is reserved. To land it makes its plan a column, and descends once that is reserved.
+
+The column is reserved when each member has stated an agreement on it, and the own list holds no agreement on
+an own plan in space. From the second epoch after that on, the plans that the others fly keep clear of it.
+"""
+
+from __future__ import annotations
+
+from math import hypot
+
+from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.commitment import Commitment
+from companion.avoidance.certified.committed import rest_time
+from companion.config.certified import CertifiedConfig
+from companion.values.horizon import Array
+
+_STANDS_M = 0.05
+"""Distance (m) from its column at which a vehicle on the ground makes a new one when it joins."""
+_MOVED = 0.5
+"""Share of the drift, or of the tube, by which it may then be off its column before it makes a new one."""
+
+
+class Reservation:
+    """Reservation of the column of one vehicle.
+
+    ``beside`` (m): how far from its column a parked vehicle may report its position. ``joined``: the vehicle
+    takes part; otherwise it is parked, or its companion has not begun.
+    """
+
+    def __init__(
+        self, config: CertifiedConfig, commitment: Commitment, agreements: Agreements, beside: float
+    ) -> None:
+        self._config, self._commitment, self._agreements = config, commitment, agreements
+        self._parks_within = beside
+        self._joins_within = _MOVED * max(config.drift, config.tube)
+        self._since: int | None = None
+        self.joined = False
+
+    def begin(self, now: int, place: Array, *, joins: bool) -> None:
+        """Begin a new column at ``place`` (3,), m, of a vehicle on the ground, unless it still stands there.
+
+        ``joins``: the vehicle is to take off. It does not join where a known plan is too near for an
+        agreement, because the other vehicle could then make no plan either.
+        """
+        commitment, agreements = self._commitment, self._agreements
+        newest = commitment.announced()
+        within = self._parks_within
+        if joins:
+            within = self._joins_within if self.joined else _STANDS_M
+        if newest is not None and commitment.column:
+            x, y, _ = place - newest.position_m
+            within -= hypot(x, y)
+        if newest is None or not commitment.column or within < 0.0:
+            agreements.begin(commitment.begin(now, place, column=True))
+            self._since = None
+        newest = commitment.announced()
+        if newest is not None:
+            agreements.made(newest)
+        if self.joined and (not joins or (agreements.unreserved() and agreements.near())):
+            self.joined, self._since = False, None
+        elif joins and not self.joined and not agreements.near():
+            agreements.rejoin()
+            self.joined = True
+
+    def has_room(self) -> bool:
+        """Return whether a vehicle in the air may make its plan a column, or let it be one.
+
+        It may not while a known plan is too near for an agreement: without a column it can move aside. Of two
+        columns that are too near, the one of the vehicle with the lower system id stays.
+        """
+        near = self._agreements.near()
+        if near and self._commitment.column:
+            near -= {system for system in self._agreements.columns if system > self._agreements.own}
+        return not near
+
+    def watch(self, now: int) -> None:
+        """Note since when (µs) nothing is missing for the reservation of the newest plan, a column."""
+        commitment = self._commitment
+        if not commitment.column or self._agreements.unreserved():
+            self._since = None
+        elif self._since is None:
+            self._since = now
+
+    def reserved(self, now: int) -> bool:
+        """Return whether the plans that others fly at ``now`` (µs) keep clear of the column."""
+        if self._since is None or not self._commitment.column:
+            return False
+        return now >= self._commitment.epoch(self._since) + 2 * self._config.epoch_us
+
+    def missing(self, now: int) -> str:
+        """Return what the autopilot must wait for at ``now`` (µs), or an empty string."""
+        if self.reserved(now):
+            horizon = self._commitment.horizon()
+            return "" if horizon is None or now >= rest_time(horizon) else "the end of its plan"
+        if not self._commitment.column:
+            return "its column"
+        near, unreserved = self._agreements.near(), self._agreements.unreserved()
+        if near:
+            return f"room for its column: the plan of {_listed(near)} is too near"
+        return f"the agreement of {_listed(unreserved)} on its column" if unreserved else "its column"
+
+
+def _listed(systems: set[int]) -> str:
+    return ", ".join(map(str, sorted(systems)))

@@ -1,0 +1,180 @@
+"""Columns of air: nobody climbs or sinks by its autopilot before all others keep clear of its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from companion.avoidance.certified import constraint_sources
+from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.columns import Distances
+from companion.avoidance.certified.negotiation import Negotiation
+from companion.values.horizon import Array
+from tests.companion.avoidance.certified.draws import delays, losses
+from tests.companion.avoidance.certified.swarm import NEVER, Habits, Rough, Swarm, Vehicle
+
+UNTIL = 6_000_000
+"""µs of a run."""
+ROWS = 2.0
+"""m between two places on the ground, which is little more than needed."""
+FLIGHTS = settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
+
+
+def places(count: int, seed: int) -> Array:
+    """A row of places (count, 3), m, at the heights to which they climb."""
+    rng = np.random.default_rng(seed)
+    row = np.array([[ROWS * k, 0.0, 5.0] for k in range(count)])
+    return row + rng.uniform(-0.05, 0.05, (count, 3))
+
+
+def wandering(count: int, seed: int) -> Callable[[int, int], Array]:
+    """Goals above the row of places, now and then a new one: more often above each other than beside."""
+
+    def goal(since: int, system: int) -> Array:
+        rng = np.random.default_rng([seed, since // 1_500_000, system])
+        place: Array = rng.uniform([-0.5, -0.7, 3.0], [ROWS * count - 1.5, 0.7, 9.0])
+        return place
+
+    return goal
+
+
+def fly(habits: list[Habits], rough: Rough, seed: int, until: int = UNTIL) -> Swarm:
+    swarm = Swarm(places(len(habits), seed), rough, habits, seed)
+    swarm.run(until, wandering(len(habits), seed))
+    return swarm
+
+
+def lands(rng: np.random.Generator) -> int:
+    return int(rng.choice([NEVER, 2_000_000 + int(rng.integers(0, 3_000_000))]))
+
+
+def at_random(seed: int, rough: Rough) -> Swarm:
+    """Some fly from the beginning, some take off, some land, at any time."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(2, 4))
+    habits = [Habits(lands=lands(rng), ahead=int(rng.integers(-5_000, 5_001))) for _ in range(count)]
+    for k in range(count):
+        if rng.random() < 0.6 or k == 0:
+            habits[k] = habits[k]._replace(takes_off=int(rng.integers(0, 2_000_000)))
+        if rng.random() < 0.2:
+            begin = int(rng.integers(0, 5_000_000))
+            habits[k] = habits[k]._replace(frozen=((begin, begin + int(rng.integers(20_000, 2_000_000))),))
+    return fly(habits, rough, seed)
+
+
+@FLIGHTS
+@given(st.integers(0, 2**16), losses, delays)
+def test_a_column_is_kept_whatever_happens(seed: int, loss: float, delay: int) -> None:
+    """From the climb's beginning to its end, and from the landing's on, all plans are apart horizontally."""
+    assert not at_random(seed, Rough(loss, delay, 0.2)).faults()
+
+
+@pytest.mark.parametrize("rough", [Rough(), Rough(0.2, 100_000), Rough(0.6, 100_000)], ids=["0", "20", "60"])
+def test_all_take_off_fly_and_land(rough: Rough) -> None:
+    """Beside each other at once, also where messages are lost, and each back at its place."""
+    row, above = places(3, 1), wandering(3, 1)
+    swarm = Swarm(row, rough, [Habits(takes_off=0, lands=5_000_000)] * 3, 1)
+    swarm.run(16_000_000, lambda since, system: above(since, system) if since < 5e6 else row[system - 1])
+    assert not swarm.faults()
+    for vehicle in swarm.vehicles:
+        assert len(vehicle.columns) == 2
+        assert any(made.found for made in vehicle.made)
+
+
+def test_columns_matter_in_these_flights() -> None:
+    """Others come as near to a column as they may."""
+    least = [at_random(seed, Rough()).least() for seed in range(8)]
+    d = at_random(0, Rough()).d
+    assert min(least) < d + 0.1
+
+
+def test_who_is_below_a_hovering_vehicle_waits_and_does_not_stop_it() -> None:
+    """It says for whom it waits."""
+    swarm = below(3_000_000)
+    assert not swarm.vehicles[0].columns
+    assert swarm.vehicles[0].flight.reservation.missing(0).startswith("room for its column: the plan of 2")
+    assert any(made.found for made in swarm.vehicles[1].made)
+    assert not swarm.faults()
+
+
+def test_of_two_whose_columns_are_too_near_none_climbs_and_both_say_so() -> None:
+    near = np.array([[0.0, 0.0, 5.0], [1.3, 0.0, 5.0]])
+    swarm = Swarm(near, Rough(), [Habits(takes_off=0)] * 2, 0)
+    swarm.run(4_000_000, lambda since, system: near[system - 1])
+    for vehicle in swarm.vehicles:
+        assert not vehicle.columns
+        assert vehicle.flight.reservation.missing(0).startswith("room for its column")
+
+
+def test_who_hears_nothing_of_an_expected_vehicle_does_not_climb() -> None:
+    silent = Rough(cuts=((0, NEVER, frozenset({3})),))
+    swarm = fly([Habits(takes_off=0), Habits(), Habits()], silent, 1)
+    vehicle = swarm.vehicles[0]
+    assert not vehicle.columns
+    assert vehicle.flight.reservation.missing(0) == "the agreement of 3 on its column"
+    assert not swarm.faults()
+
+
+def test_who_does_not_take_off_is_passed_and_is_not_waited_for() -> None:
+    swarm = fly([Habits(takes_off=NEVER), Habits(), Habits()], Rough(0.2, 100_000), 3)
+    assert not swarm.faults()
+    assert {made.system for made in swarm.made() if made.found} == {2, 3}
+
+
+def below(until: int) -> Swarm:
+    """1 is to take off below 2, which hovers."""
+    swarm = Swarm(np.array([[0.0, 0.0, 5.0], [0.3, 0.0, 5.0]]), Rough(), [Habits(takes_off=0), Habits()], 0)
+    swarm.run(until, lambda since, system: np.array([0.3, 0.0, 5.0]))
+    return swarm
+
+
+def flights() -> Iterator[Swarm]:
+    """Of one below another, and twenty at random."""
+    yield below(3_000_000)
+    for seed in range(20):
+        yield at_random(seed, Rough(0.9, 500_000) if seed % 2 else Rough(0.3, 150_000, 0.2))
+
+
+def climb_without_waiting(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Vehicle, "may_move", lambda self, now: self.flight.commitment.column)
+
+
+def ignore_the_column(patch: pytest.MonkeyPatch) -> None:
+    """Planes near a column are in space."""
+    patch.setattr(constraint_sources, "levelled", lambda plan, own: plan)
+
+
+def agree_nearer_than_allowed(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Agreements, "near", lambda self, plans=None: set())
+    patch.setattr(Negotiation, "_reservable", lambda self, newest, plans: True)
+
+
+def keep_planes_in_space(patch: pytest.MonkeyPatch) -> None:
+    """The landing begins though an agreement on a plan in space is kept."""
+    patch.setattr(Agreements, "_on_column", lambda self, one: True)
+
+
+def look_at_heights(patch: pytest.MonkeyPatch) -> None:
+    """A plan is taken for apart from a column if it is high enough above it."""
+    apart = Distances.apart
+    patch.setattr(Distances, "apart", lambda self, one, other, columns: apart(self, one, other, 0))
+
+
+@pytest.mark.parametrize(
+    "mutation",
+    [
+        climb_without_waiting,
+        ignore_the_column,
+        agree_nearer_than_allowed,
+        keep_planes_in_space,
+        look_at_heights,
+    ],
+)
+def test_a_missing_rule_is_found(mutation: Callable[[Any], None], monkeypatch: pytest.MonkeyPatch) -> None:
+    mutation(monkeypatch)
+    assert any(swarm.faults() for swarm in flights())

@@ -1,0 +1,130 @@
+"""The verdict on take-offs and landings: in a column that all others keep, or it is a finding."""
+
+from __future__ import annotations
+
+import pytest
+
+from mavlink_bridge.wire.agreements import Statement
+from mavlink_bridge.wire.plan import Integers, WirePlan
+from outrider.certify.evidence import Evidence, LoggedStatement, Order
+from outrider.certify.verdict import Verdict, judge
+from tests.outrider.certify.evidence import BEGAN, EPOCH, TERMS, evidence, on, restated, standing, turned
+
+WIDE = TERMS._replace(further=0.3)
+GROUND = standing((0.0, 0.0, 0.0))._replace(column=True)
+BESIDE = standing((3.0, 0.0, 5.0))
+EPOCHS = 8
+LEAVES = 6
+"""Number of the epoch of the first plan in space."""
+
+
+def at(number: int) -> int:
+    """The epoch with this ``number`` (µs)."""
+    return BEGAN + number * EPOCH
+
+
+def climbing() -> list[WirePlan]:
+    column = [on(GROUND, k) for k in range(LEAVES)]
+    up = on(GROUND, LEAVES).at_height(5.0)
+    return [*column, *(on(up, k) for k in range(EPOCHS - LEAVES))]
+
+
+def ordered(whole: Evidence, epoch: int, *, climbs: bool = True) -> Evidence:
+    """11 orders its autopilot to climb, or to land, half an epoch before ``epoch``."""
+    first, *others = whole.logs
+    number = max(one.number for one in first.statements if one.statement.epoch <= at(epoch))
+    order = Order(at(epoch) - EPOCH // 2, climbs, number)
+    return whole._replace(logs=(first._replace(orders=(*first.orders, order)), *others))
+
+
+def flight(other: list[WirePlan] | None = None, order: int = 3, own: list[WirePlan] | None = None) -> Verdict:
+    plans = [on(BESIDE, k) for k in range(EPOCHS)] if other is None else other
+    return judge(ordered(evidence({11: own or climbing(), 12: plans}, WIDE), order))
+
+
+def kinds(verdict: Verdict) -> set[str]:
+    return {finding.what for finding in verdict.findings}
+
+
+def passing(east: float, height: float = 5.0) -> list[WirePlan]:
+    """Plans of 12 that come ``east`` m nearer to the column in the epoch 4."""
+    still = [on(standing((3.0, 0.0, height)), k) for k in range(4)]
+    most = round(1000 * east)
+    back: list[Integers] = [(-most, 0, 0)] * 5 + [(most, 0, 0)] * 5
+    moved = turned(on(still[0], 4), back)
+    return [*still, *(on(moved, k) for k in range(EPOCHS - 4))]
+
+
+def test_a_climb_in_a_reserved_column_is_certified() -> None:
+    verdict = flight()
+    assert verdict.findings == ()
+    assert verdict.pairs.checked == EPOCHS
+
+
+def test_a_column_may_be_left_at_any_height_but_nowhere_else() -> None:
+    elsewhere = [*climbing()[:LEAVES], *(on(standing((0.1, 0.0, 5.0)), k) for k in range(LEAVES, EPOCHS))]
+    assert len(flight(own=elsewhere).document()["findings"]) == 0
+    assert flight(own=elsewhere).document()["anchors"] == 1
+    assert flight().document()["anchors"] == 0
+
+
+def test_a_climb_before_the_reservation_is_found() -> None:
+    (finding,) = flight(order=0).findings
+    assert finding.what == "a climb without a reservation"
+    assert finding.who[0] == 11
+
+
+def test_a_climb_within_an_epoch_of_the_reservation_is_found() -> None:
+    """The others may still fly a plan that they made before."""
+    whole = ordered(evidence({11: climbing(), 12: [on(BESIDE, k) for k in range(EPOCHS)]}, WIDE), 0)
+    first, second = whole.logs
+    (order,) = first.orders
+    found = {}
+    for late in (EPOCH - 2_000, EPOCH):
+        moved = order._replace(time=order.time + late, number=order.number + 1)
+        logs = first._replace(orders=(moved,)), second
+        found[late] = [one.figures for one in judge(whole._replace(logs=logs)).findings]
+    assert found == {EPOCH - 2_000: ["reserved for less than an epoch"], EPOCH: []}
+
+
+def test_a_climb_without_a_column_is_found() -> None:
+    space = [plan._replace(column=False) for plan in climbing()[:LEAVES]]
+    (finding, *_) = flight(own=space).findings
+    assert finding.what == "a climb without a reservation"
+    assert finding.figures == "its plan is no column"
+
+
+def test_a_climb_beside_one_that_states_nothing_is_found() -> None:
+    def silent(one: LoggedStatement) -> Statement | None:
+        return None if one.sender == 12 and one.owner == 11 else one.statement
+
+    whole = evidence({11: climbing(), 12: [on(BESIDE, k) for k in range(EPOCHS)]}, WIDE)
+    found = kinds(judge(ordered(restated(whole, silent), 3)))
+    assert "a climb without a reservation" in found
+
+
+@pytest.mark.parametrize(("east", "found"), [(0.70, False), (0.80, True), (2.9, True)])
+def test_a_plan_that_does_not_keep_a_column_is_found(east: float, found: bool) -> None:
+    """3 m apart, of which 1.2 m and 0.3 m are required: it may come 0.75 m nearer, at any height."""
+    for height in (5.0, 40.0):
+        assert ("a plan beyond agreed planes" in kinds(flight(passing(east, height)))) is found
+
+
+def test_above_a_column_plans_are_too_near() -> None:
+    assert "plans nearer than certified" in kinds(flight(passing(2.9, 40.0)))
+
+
+def test_an_agreement_too_near_a_column_is_found() -> None:
+    near = [on(standing((1.3, 0.0, 5.0)), k) for k in range(EPOCHS)]
+    assert "an agreement too near a column" in kinds(flight(near))
+
+
+def test_a_landing_needs_a_column_and_others_keep_it_for_ever() -> None:
+    up = standing((0.0, 0.0, 5.0))
+    own = [up, *(on(up, k)._replace(column=True) for k in range(1, EPOCHS))]
+    whole = evidence({11: own, 12: [on(BESIDE, k) for k in range(EPOCHS)]}, WIDE)
+    assert judge(ordered(whole, 4, climbs=False)).findings == ()
+    (finding,) = judge(ordered(whole, 1, climbs=False)).findings
+    assert finding.what == "a descent without a reservation"
+    over = evidence({11: own, 12: passing(2.9, 40.0)}, WIDE)
+    assert "plans nearer than certified" in kinds(judge(ordered(over, 3, climbs=False)))
