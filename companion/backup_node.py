@@ -94,6 +94,13 @@ def accepts(link: str, system: int) -> Accept:
     )
 
 
+def accepts_peers(system: int) -> Accept:
+    """Return the header filter of the swarm link for ``BackupNode.hear`` of ``system``."""
+    return lambda identifier, sender, component: (
+        identifier == mavlink.MAVLINK_MSG_ID_TUNNEL and sender != system and component == COMPONENT
+    )
+
+
 class BackupNode:
     """Backup ``Node`` beside the companion of ``system``, on the same clock.
 
@@ -200,7 +207,7 @@ class BackupNode:
         To be sent on the swarm link once the companion's process has ended. Nothing without a flown plan, and
         before the newest one has begun at ``now`` (µs) by the clocks of all. The plan is carried on, because
         old plans are not accepted; the entries are the last ones of the companion, by which the others know
-        that this farewell answers their own beginning.
+        that this farewell answers their own beginning, and name the newest plans that ``hear`` was given.
         """
         if self._received is None or not self._plans:
             return []
@@ -216,6 +223,31 @@ class BackupNode:
             Tunnel(self._own, 0, 0, PLAN, pack_plan(plan)),
             *(Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(part)) for part in in_messages(statement)),
         ]
+
+    def hear(self, now: int, messages: Sequence[Message]) -> None:
+        """Take note of the others' plans among ``messages``, received after the companion's end.
+
+        The farewell names the newest of each, so that it also answers who has begun anew since. ``now`` (µs):
+        time of the fleet.
+        """
+        for message in messages:
+            if not isinstance(message, Tunnel) or message.payload_type != PLAN:
+                continue
+            system, component = message.source
+            if component != COMPONENT or system == self._own.system:
+                continue
+            try:
+                plan = unpack_plan(message.payload)
+            except PlanWireError:
+                continue
+            if plan.origin != self._fleet.fingerprint or not self._near(now, plan):
+                continue
+            entry = self._entries.get(system, Entry(system))
+            if plan.epoch > entry.considered[1]:
+                self._entries[system] = entry._replace(considered=(entry.considered[0], plan.epoch))
+
+    def _near(self, now: int, plan: WirePlan) -> bool:
+        return abs(plan.epoch - now) <= _MAX_EPOCHS_AWAY * self._config.certified.epoch_us
 
     def _heartbeat(self, now: int) -> list[Datagram]:
         """Return a heartbeat once a second: routers learn the route from it, and operators see the node."""
@@ -258,8 +290,7 @@ class BackupNode:
             plan = unpack_plan(message.payload)
         except PlanWireError:
             return
-        near = abs(plan.epoch - now) <= _MAX_EPOCHS_AWAY * self._config.certified.epoch_us
-        if plan.origin != self._fleet.fingerprint or not rests(plan) or not near:
+        if plan.origin != self._fleet.fingerprint or not rests(plan) or not self._near(now, plan):
             return
         self._plans[plan.epoch] = plan
         # Keep the plan that is flown, and those after it.

@@ -50,6 +50,11 @@ class FleetTimeBackup:
         """Return the newest plan and the statement that it is the last one, see ``BackupNode.farewell``."""
         return [] if self._ahead is None else self._node.farewell(now + self._ahead)
 
+    def hear(self, now: int, messages: Sequence[Message]) -> None:
+        """Take note of the others' plans at ``now`` (µs, own clock), see ``BackupNode.hear``."""
+        if self._ahead is not None:
+            self._node.hear(now + self._ahead, messages)
+
     def rests(self, now: int, settling: int) -> bool:
         """Return whether no plan is flown at ``now`` (µs, own clock), or it has ended, see ``BackupNode``."""
         return self._ahead is None or self._node.rests(now + self._ahead, settling)

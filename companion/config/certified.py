@@ -26,6 +26,9 @@ class DeadlockConfig(Settings):
     )
     up: Positive = Field(4.0, description="rad/s at which it turns aside where it is pushed back in full")
     down: Positive = Field(6.0, description="rad/s at which it turns back")
+    chase: Positive = Field(
+        1.0, description="m/s to the side and ahead with which another vehicle is not turned away from"
+    )
     speed: Positive = Field(2.0, description="m/s of the rest point towards the goal that is no stall")
     pushed: float = Field(0.2, ge=0.0, lt=1.0, description="share of the pull from which it counts as pushed")
 
@@ -98,11 +101,11 @@ class CertifiedConfig(Settings):
     repeat_us: int = Field(
         50_000, gt=0, le=2_000_000, multiple_of=4, description="µs between two transmissions of a plan"
     )
-    patience_us: int = Field(
-        100_000,
+    lead_us: int = Field(
+        60_000,
         ge=0,
         le=2_000_000,
-        description="µs of an epoch for which a plan waits for agreements on the newest plans",
+        description="µs before the end of an epoch at which the plan of the next one is made",
     )
     gone_us: int = Field(
         1_000_000, gt=0, le=60_000_000, description="µs of silence after which no plan waits for a vehicle"

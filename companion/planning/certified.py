@@ -25,6 +25,8 @@ from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
 
 _NOT_ASKED = "its column"
 """What a vehicle waits for that has not begun to reserve it."""
+_REST_SPEED, _REST_US = 0.3, 500_000
+"""A vehicle rests if it was slower than this (m/s, on each axis) for this time (µs)."""
 
 
 class VehicleParts(NamedTuple):
@@ -59,6 +61,8 @@ class CertifiedAvoidance:
         self._plans = 0
         self._finishing = False
         self._next_observation = 0
+        self._waits_since: int | None = None
+        self._rests_since: int | None = None
 
     @property
     def held(self) -> int:
@@ -90,8 +94,26 @@ class CertifiedAvoidance:
         """Do nothing: the limits of committed plans are those of the configuration."""
 
     def begin(self, now: int, measured: Motion) -> None:
-        """Hold the ``measured`` position, or continue the committed plan, see ``CertifiedFlight.stand``."""
-        self._flight.stand(now, measured.position)
+        """Hold the ``measured`` position, or continue the committed plan, see ``CertifiedFlight.stand``.
+
+        Without a plan, nothing begins before the vehicle rests: it may fly a plan of this companion's
+        predecessor, on which the others rely and which the backup node sends to its end. That end is reached
+        after ``lookahead_s`` at the latest.
+        """
+        if self._may_begin(now, measured):
+            self._flight.stand(now, measured.position)
+
+    def _may_begin(self, now: int, measured: Motion) -> bool:
+        """Return whether there is a plan, the vehicle has rested for ``_REST_US``, or waited long enough."""
+        if self._flight.commitment.current is not None:
+            return True
+        self._waits_since = now if self._waits_since is None else self._waits_since
+        if float(abs(measured.velocity).max()) >= _REST_SPEED:
+            self._rests_since = None
+        elif self._rests_since is None:
+            self._rests_since = now
+        rested = self._rests_since is not None and now - self._rests_since >= _REST_US
+        return rested or now - self._waits_since >= 1e6 * self.lookahead_s
 
     def park(self, now: int, measured: Motion, stance: Stance) -> None:
         """Hold the column of a vehicle on the ground, or one that climbs, see ``CertifiedFlight.park``."""
@@ -137,7 +159,7 @@ class CertifiedAvoidance:
         flight = self._flight
         if self._finishing:
             flight.commitment.turn(now)
-        elif not self._pilot.guided:
+        elif not self._pilot.guided and flight.commitment.current is not None:
             flight.stand(now, situation.measured.position)
         if self._pilot.guided and not situation.stale:
             flight.watch(now, situation.measured)

@@ -39,8 +39,8 @@ class FleetTimeAvoidance(CertifiedAvoidance):
     def begin(self, now: int, measured: Motion) -> None:
         """Hold the ``measured`` position, or continue the committed plan."""
         fleet = self._fleet_time(now)
-        if fleet is not None:
-            super().begin(fleet, measured)
+        if self._may_begin(now, measured) and fleet is not None:
+            self._flight.stand(fleet, measured.position)
 
     def park(self, now: int, measured: Motion, stance: Stance) -> None:
         """Hold the column of a vehicle on the ground, or one that climbs, once fleet time is known."""
@@ -58,10 +58,11 @@ class FleetTimeAvoidance(CertifiedAvoidance):
         """Bring the committed plan up to date, see ``CertifiedAvoidance.fly``."""
         fleet = self._fleet_time(now)
         if fleet is None:
-            self._wait(now, situation.measured)
+            if self._may_begin(now, situation.measured):
+                self._wait(now, situation.measured)
             return None
-        if self._flight.commitment.current is None:
-            super().begin(fleet, situation.measured)
+        if self._flight.commitment.current is None and self._may_begin(now, situation.measured):
+            self._flight.stand(fleet, situation.measured.position)
         places = super().fly(fleet, situation)
         if self.horizon is not None:
             self.horizon = self.horizon._replace(epoch=self.horizon.epoch - (fleet - now))

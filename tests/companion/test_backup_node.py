@@ -246,23 +246,46 @@ def test_its_farewell_is_accepted_by_the_others_with_which_there_was_an_agreemen
     bench.node.step(bench.now, [bench.tell("swarm", stated())])
     bench.speaks = False
     bench.run(9.0)
-    own = plan_from(BEGIN, seed=2)
-    for system, since, accepted in ((12, BEGIN, True), (12, BEGIN + 1_000_000, False), (13, BEGIN, False)):
-        certified, known = CONFIG.certified, identity(CONFIG, FLEET)
-        agreements = Agreements(system, certified, STEPS, known, Geometry(lambda *_: True, lambda *_: True))
-        agreements.begin(since)
-        agreements.made(own._replace(epoch=since))
-        for message in bench.node.farewell(bench.now):
-            assert isinstance(message, Tunnel)
-            if message.payload_type == PAYLOAD_TYPE:
-                agreements.receive_plan(bench.now, SYSTEM, message.payload)
-            else:
-                agreements.receive_statement(bench.now, SYSTEM, unpack_statement(message.payload))
+    for system, since, expected in ((12, BEGIN, True), (12, BEGIN + 1_000_000, False), (13, BEGIN, False)):
         # The second has begun anew since, and the third has never agreed: this farewell may be an old one.
-        assert (SYSTEM in agreements.left) is accepted
-        if accepted:
-            end = horizon_of(bench.plans[-1]).at(bench.now).position
-            assert np.allclose(agreements.left[SYSTEM].controls[-1, 2], end, atol=1e-9)
+        assert accepted(bench, system, since) is expected
+
+
+def test_its_farewell_is_accepted_by_others_whose_plans_it_has_received_since() -> None:
+    bench = Bench()
+    bench.run(1.0)
+    bench.node.step(bench.now, [bench.tell("swarm", stated())])
+    bench.speaks = False
+    bench.run(9.0)
+    now, stray = bench.now, plan_from(bench.now + 1_000_000)
+    newest = plan_from(now, seed=2)
+    for plan in (newest, newest._replace(epoch=now - 400_000), stray):
+        bench.node.hear(now, [told(plan, Source(12, COMPONENT)), told(plan, Source(SYSTEM, COMPONENT))])
+    bench.node.hear(now, [told(newest._replace(origin=newest.origin ^ 1), Source(13, COMPONENT))])
+    assert accepted(bench, 12, now)
+    assert not accepted(bench, 12, now + 200_000)
+    assert not accepted(bench, 13, BEGIN)
+    bench.node.hear(now, [told(newest, Source(13, COMPONENT))])
+    assert accepted(bench, 13, BEGIN)
+
+
+def accepted(bench: Bench, system: int, since: int) -> bool:
+    """Whether ``system``, which begins at ``since`` (µs), accepts the backup node's farewell now."""
+    certified, known = CONFIG.certified, identity(CONFIG, FLEET)
+    agreements = Agreements(system, certified, STEPS, known, Geometry(lambda *_: True, lambda *_: True))
+    agreements.begin(since)
+    agreements.made(plan_from(since, seed=2))
+    for message in bench.node.farewell(bench.now):
+        assert isinstance(message, Tunnel)
+        if message.payload_type == PAYLOAD_TYPE:
+            agreements.receive_plan(bench.now, SYSTEM, message.payload)
+        else:
+            agreements.receive_statement(bench.now, SYSTEM, unpack_statement(message.payload))
+    if SYSTEM not in agreements.left:
+        return False
+    end = horizon_of(bench.plans[-1]).at(bench.now).position
+    assert np.allclose(agreements.left[SYSTEM].controls[-1, 2], end, atol=1e-9)
+    return True
 
 
 def test_statements_without_a_farewell_and_those_of_others_change_nothing() -> None:

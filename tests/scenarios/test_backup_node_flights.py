@@ -6,10 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from companion.avoidance.certified.agreements import Agreements
 from companion.node import Companion
 from companion.planning.certified import CertifiedAvoidance
+from outrider.certify.reading import read
+from outrider.certify.verdict import judge
+from outrider.runs.configuration import CONFIGURATION
 from tests.scenarios.lockstep_flights import fly, scenario
 
 SWAP: dict[str, Any] = {
@@ -56,6 +60,31 @@ def test_a_plan_is_kept_whose_companion_is_silent(
     others = [c for c in flight.companions if c.name != "companion-12"]
     assert [12 in agreements(c).left for c in others] == [ended] * 2
     assert flown.summary["others_converge_s"] is not None
+
+
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_a_companion_that_restarts_in_the_air_begins_where_the_plan_before_ends(
+    flavour: str, tmp_path: Path
+) -> None:
+    """It begins 0.5 s later, while the backup node still flies at 4 m/s, and knows nothing of that plan."""
+    struck = {"kind": "restart", "vehicle": 12, "at_s": 1.5, "for_s": 0.5}
+    of = scenario(
+        "antipodal-8", {**SWAP, "flavour": flavour, "faults": [struck], "autopilot": {"guided_timeout": 0.3}}
+    )
+    flown = fly(of, 1, tmp_path)
+    # The rest of a plan of 3.2 s, with a set-point every 20 ms.
+    assert flown.flight.backup_nodes[1].carried > 100
+    assert flown.summary["converged"] is True
+    assert flown.summary["d_min_violations"] == 0
+    assert flown.summary["anchored_anew"] == 0
+    tracking = flown.summary["tracking_error_m"]
+    assert isinstance(tracking, dict)
+    assert tracking["max"] is not None
+    assert tracking["max"] < 0.5
+    document = {"seed": 1, "scenario": of.model_dump(mode="json")}
+    (tmp_path / CONFIGURATION).write_text(yaml.safe_dump(document), encoding="utf-8")
+    evidence = read(tmp_path, lambda _name, _share: None)
+    assert judge(evidence).certified
 
 
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])

@@ -21,7 +21,7 @@ from companion.avoidance.certified.committed import (
     resting,
     rounding,
 )
-from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
 from companion.avoidance.certified.detour import Subgoal
 from companion.avoidance.certified.qp import Objective, SeparationQp, State
 from companion.avoidance.certified.separating_planes import Others, kept, planes
@@ -185,11 +185,13 @@ class Commitment:
                 continue
             # The rounded plan is checked, because the others receive the rounded one.
             if kept(corridor, points):
+                ways = others.controls[:, -1, 2] - others.controls[:, 0, 0]
+                pushes = Pushes(answer.forces, ways / (1e-6 * self._config.dt_us * self._program.n))
                 moving = objective.moving
                 gradient = self._program.costs[moving].gradient_per_metre
                 seconds = 1e-6 * self._config.epoch_us
                 self._deadlock_turn.learn(
-                    points[-1, 2], goal.place, answer.push, gradient, seconds, goal.beyond, moving=moving
+                    points[-1, 2], goal.place, pushes, gradient, seconds, goal.beyond, moving=moving
                 )
                 self.following = plan
                 return True

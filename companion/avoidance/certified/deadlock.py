@@ -11,12 +11,14 @@ The push is F = Σ λ c, the sum of the planes' normals c times the multipliers 
 b = clip(−F·d / (G · L), 0, 1) · clip(1 − v_L/v, 0, 1). d and L are the direction and the distance of the goal
 from the rest point, G is the gradient of the cost per metre of error, v_L the speed at which L falls, and v
 the setting ``deadlock.speed``. If b exceeds ``deadlock.pushed`` the turn grows at a rate proportional to b;
-otherwise it decreases.
+otherwise it decreases. Pushes of vehicles that fly to the side of the turn and ahead do not count: a vehicle
+that turned with them would pass them on the far side, with the goal on the near one.
 """
 
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +31,16 @@ _MIN_PULL_DISTANCE_M = 0.5
 _MIN_GAIN_M = 0.05
 _REACHED_M = 0.1
 """Progress: the rest point is nearer to the goal than ``_REACHED_M``, or ``_MIN_GAIN_M`` nearer than ever."""
+
+
+class Pushes(NamedTuple):
+    """Forces (M, 3) of planes, Σ λ c of each, and velocities (M, 3), m/s, of what is on their other sides.
+
+    A velocity is the mean one of a plan from its beginning to its end.
+    """
+
+    forces: Array
+    velocities: Array
 
 
 class DeadlockTurn:
@@ -72,7 +84,7 @@ class DeadlockTurn:
         self,
         rest: Array,
         goal: Array,
-        push: Array,
+        pushes: Pushes,
         gradient_per_metre: float,
         seconds: float,
         beyond: float = 0.0,
@@ -81,11 +93,10 @@ class DeadlockTurn:
     ) -> None:
         """Update the turn from the plan just made.
 
-        The plan ends at rest at ``rest`` (3,), m. ``push`` (3,) is the force F of its planes,
-        ``gradient_per_metre`` the gradient of its cost per metre of error. The previous plan was made
-        ``seconds`` ago. ``beyond`` (m): length of the way from ``goal``, if that is a sub-goal.
-        ``moving``: the goal moves; the distance from it then does not measure progress, and the turn stays
-        below ``bend``.
+        The plan ends at rest at ``rest`` (3,), m. ``pushes``: of its planes. ``gradient_per_metre``: the
+        gradient of its cost per metre of error. The previous plan was made ``seconds`` ago. ``beyond`` (m):
+        length of the way from ``goal``, if that is a sub-goal. ``moving``: the goal moves; the distance from
+        it then does not measure progress, and the turn stays below ``bend``.
         """
         config = self._config
         offset = goal - rest
@@ -100,11 +111,12 @@ class DeadlockTurn:
         else:
             self._waited += seconds
         overtime = max(0.0, self._waited - config.patience)
-        nearly = max(direct, 1e-6)
-        push_back = -float(push @ offset) / nearly
+        direction = offset / max(direct, 1e-6)
+        push = pushes.forces.sum(axis=0) if moving else self._away(pushes, direction)
+        push_back = -float(push @ direction)
         if overtime > 0.0:
             # After ``patience`` without progress, a push back along the turned direction counts, too.
-            push_back = max(push_back, -float(push @ turned(offset, -self._sense * self.angle)) / nearly)
+            push_back = max(push_back, -float(push @ turned(direction, -self._sense * self.angle)))
         pushed = min(max(push_back / (gradient_per_metre * max(direct, _MIN_PULL_DISTANCE_M)), 0.0), 1.0)
         pushed *= min(max(1.0 - approach_speed / config.speed, 0.0), 1.0)
         if pushed > config.pushed:
@@ -112,3 +124,15 @@ class DeadlockTurn:
             self.angle = min(most, self.angle + config.up * seconds * pushed)
         else:
             self.angle = max(0.0, self.angle - config.down * seconds / (1.0 + overtime))
+
+    def _away(self, pushes: Pushes, direction: Array) -> Array:
+        """Return the force (3,) that the turn answers, for a goal in ``direction`` (3,).
+
+        A vehicle that crosses to the side of the turn, and flies in about this direction as well, stays
+        beside a vehicle that turns: its push does not count.
+        """
+        aside = turned(direction, -self._sense * 0.5 * np.pi)
+        velocities = pushes.velocities / self._config.chase
+        crossing = np.clip(velocities @ aside, 0.0, 1.0) * np.clip(velocities @ direction, 0.0, 1.0)
+        result: Array = (1.0 - crossing) @ pushes.forces
+        return result

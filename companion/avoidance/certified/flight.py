@@ -178,10 +178,11 @@ class CertifiedFlight:
     def due(self, now: int) -> bool:
         """Begin the next epoch if it is time; return True if ``plan`` is to be called for it now.
 
-        That is when no member's clock is wrong and there is an agreement with each member. If an agreement on
-        the newest plans is about to be made, the plan waits for it until ``patience_us`` of the epoch are
-        over. Without an agreement with a member, the committed plan is continued for an epoch at the last
-        call (``Commitment.last_call``).
+        That is ``lead_us`` before the end of the epoch, when no member's clock is wrong and there is an
+        agreement with each member: what is known late in the epoch still counts. If an agreement on the
+        newest plans is about to be made, the plan waits for it until the last call
+        (``Commitment.last_call``). Without an agreement with a member, the committed plan is continued for an
+        epoch at the last call.
         """
         self._polled_at, self._in_control = now, True
         self.agreements.rejoin()
@@ -197,8 +198,9 @@ class CertifiedFlight:
                 self.commitment.carry_on(HoldReason.CLOCK if wrong else HoldReason.MISSING)
             return False
         epoch = self.commitment.epoch(now)
-        waits = now < epoch + self._config.certified.patience_us and not self.commitment.last_call(now)
-        return not (waits and self.agreements.outdated(now, epoch))
+        if now + self._config.certified.lead_us < epoch + self._config.certified.epoch_us:
+            return False
+        return self.commitment.last_call(now) or not self.agreements.outdated(now, epoch)
 
     def _agree(self, now: int) -> None:
         """Take and propose agreements if a message was received or a plan was made."""

@@ -86,6 +86,9 @@ class Negotiation:
         elif refused is not None and pair.newer(refused, pair.considered):
             pair.refuse(refused)
             peer.changed = True
+        elif other is not None and not pair.kept and pair.acknowledge(other.plan.epoch):
+            # If this vehicle ends before there is an agreement, its farewell answers the peer all the same.
+            peer.changed = True
 
     def plans_of(self, peer: Peer, one: Agreement) -> AgreedPlans | None:
         """Return the two plans of an agreement; None if one is not filed."""

@@ -101,6 +101,17 @@ class Pair:
         if self.newer(one, self.considered):
             self.considered = one
 
+    def acknowledge(self, other: int) -> bool:
+        """Count the peer's plan of ``other`` (µs) as considered, if none since its beginning was.
+
+        It refuses an agreement on this plan and on none of the own, so that every real one remains possible.
+        Returns whether it did.
+        """
+        if not self.considered.other < self._others_since <= other:
+            return False
+        self.considered = Agreement(self.considered.own, other)
+        return True
+
     def receive(self, epoch: int, since: int, entry: Entry) -> bool:
         """Receive the peer's ``entry`` about this vehicle; return whether the own list has changed.
 

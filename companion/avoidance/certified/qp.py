@@ -86,12 +86,12 @@ class Objective(NamedTuple):
 class Answer(NamedTuple):
     """Accelerations (n, 3), m/s², of a solution.
 
-    ``push`` (3,): the force of the planes, the sum of their normals times the multipliers ≥ 0 of their rows.
+    ``forces`` (M, 3): of the planes of each obstacle, the sum of their normals times the multipliers ≥ 0.
     ``rounds``: the number of QPs solved.
     """
 
     accelerations: Array
-    push: Array
+    forces: Array
     rounds: int
 
 
@@ -160,21 +160,19 @@ class SeparationQp:
         write_cost(*known)
         most = _LIMITS * n + planes.wanted.size
         of, normals, low = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
+        whose = np.empty(planes.wanted.size, np.int64)
         # The planes are made so that the committed plan keeps them.
         known = *state[:3], self.dt, state.committed, self._ranges
         known += planes.normals, planes.wanted, self._a_max, self._change, a_min, a_max, of, normals, low
-        count_planes, count = rows_within(*known)
-        problem = _Problem(c, start, of[:count], normals[:count], low[:count], a_min, a_max)
-        return self._by_active_set(problem, count_planes, cost) or self._by_rows(
-            problem, count_planes, state, self._P[objective.moving]
-        )
+        known += (whose,)
+        of_planes, count = rows_within(*known)
+        rows = of[:count], normals[:count], low[:count]
+        problem = _Problem(c, start, *rows, a_min, a_max, whose[:of_planes], len(planes.wanted))
+        return self._by_active_set(problem, cost) or self._by_rows(problem, state, self._P[objective.moving])
 
-    def _by_active_set(self, problem: _Problem, planes: int, cost: Cost) -> Answer | None:
-        """Return the solution of what binds; None if there is none, or if it violates a row or bound.
-
-        The first ``planes`` rows are those of planes.
-        """
-        rows: Any = problem[2:]
+    def _by_active_set(self, problem: _Problem, cost: Cost) -> Answer | None:
+        """Return the solution of what binds; None if there is none, or if it violates a row or bound."""
+        rows: Any = problem[2:7]
         memory: Any = self._active, self._images, self._gram, self._missing
         count = active_set(cost.inverse, problem.start, self.dt, self._maps, *rows, *memory)
         if count < 0:
@@ -183,9 +181,10 @@ class SeparationQp:
             multipliers = self._multipliers(count)
         except SolverError:
             return None
-        a, push = np.empty((3, self.n)), np.empty(3)
-        found: Any = problem.start, self._images, multipliers, self._active, self.dt, *rows, planes, a, push
-        return Answer(a.T, push, 1) if combine(*found) <= BOUND else None
+        a, forces = np.empty((3, self.n)), np.empty((problem.obstacles, 3))
+        found: Any = problem.start, self._images, multipliers, self._active, self.dt, *rows
+        found += problem.whose, a, forces
+        return Answer(a.T, forces, 1) if combine(*found) <= BOUND else None
 
     def _multipliers(self, count: int) -> Array:
         """Return the multipliers (count,) of the active set, by PIQP; raises SolverError without a result."""
@@ -194,12 +193,12 @@ class SeparationQp:
         result: Array = equation_solver(count, 0).solve(*self._duals[count]).x
         return result
 
-    def _by_rows(self, problem: _Problem, planes: int, state: State, P: Array) -> Answer:
+    def _by_rows(self, problem: _Problem, state: State, P: Array) -> Answer:
         """Return PIQP's solution in the accelerations, with the rows that matter.
 
-        The first ``planes`` rows are those of planes. Raises SolverError as ``solve`` describes.
+        Raises SolverError as ``solve`` describes.
         """
-        c, start, of, normals, low, a_min, a_max = problem
+        c, start, of, normals, low, a_min, a_max, whose, obstacles = problem
         best = np.minimum(np.maximum(start, a_min), a_max)
         candidates = self._slacks(problem, state.committed.T) < _NEAR
         candidates |= self._slacks(problem, best) < 0.0
@@ -212,8 +211,10 @@ class SeparationQp:
             a: Array = found.x.reshape(3, self.n)
             broken = self._slacks(problem, a) < -_TOLERANCE
             if not broken.any():
-                of_planes = chosen < planes
-                return Answer(a.T, found.multipliers[of_planes] @ normals[chosen[of_planes]], count)
+                planes = chosen[chosen < len(whose)]
+                forces = np.zeros((obstacles, 3))
+                np.add.at(forces, whose[planes], found.multipliers[: len(planes), None] * normals[planes])
+                return Answer(a.T, forces, count)
             if not (broken & ~candidates).any():
                 break
             candidates |= broken
@@ -230,7 +231,8 @@ class _Problem(NamedTuple):
     """One problem, by axis: c and the best plan without inequalities, (3, n).
 
     ``of`` (R,), ``normals`` (R, 3) and ``low`` (R,) are the rows of ``rows_within``; ``a_min``, ``a_max``
-    (3, n) the bounds of the accelerations.
+    (3, n) the bounds of the accelerations. The first rows are those of planes, of which ``whose`` (P,) names
+    the obstacles, out of ``obstacles``.
     """
 
     c: Array
@@ -240,3 +242,5 @@ class _Problem(NamedTuple):
     low: Array
     a_min: Array
     a_max: Array
+    whose: NDArray[np.int64]
+    obstacles: int

@@ -79,6 +79,7 @@ def _write_row(r: int, of: NDArray[np.int64], c: Array, maps: Array, row: Array)
     output(1, INT),
     output(2),
     output(1),
+    output(1, INT),
 )
 def rows_within(
     position: Array,
@@ -96,6 +97,7 @@ def rows_within(
     of: NDArray[np.int64],
     c: Array,
     low: Array,
+    whose: NDArray[np.int64],
 ) -> tuple[int, int]:
     """Write the bounds of the accelerations, and the rows that some accelerations within them violate.
 
@@ -105,8 +107,9 @@ def rows_within(
     step to step, ∞ for any. A bound or limit that the ``committed`` accelerations (n, 3) violate is relaxed
     to what they keep. ``normals``, ``wanted`` (M, n, 3): the planes. Written are the bounds ``x_min``,
     ``x_max`` (3, n), and arrays of length R ≥ 24n + 3nM: row r is ``c``·y ≥ ``low`` with the result y of
-    number ``of``. No input changes the first control point of all; it has no rows. The change at the
-    beginning and the one at the end, to rest, are bounds of the first and the last acceleration.
+    number ``of``; ``whose`` (≥ 3nM,) is the number m of the obstacle of a plane. No input changes the first
+    control point of all; it has no rows. The change at the beginning and the one at the end, to rest, are
+    bounds of the first and the last acceleration.
     """
     n = x_min.shape[1]
     a, flown = np.empty((3, n)), np.empty((5 * n, 3))
@@ -137,7 +140,7 @@ def rows_within(
                     least += min(normal[axis] * lowest[y, axis], normal[axis] * highest[y, axis])
                 # What is not finite stays.
                 if not least >= bound and y > 0:
-                    of[count], low[count] = y, bound
+                    of[count], low[count], whose[count] = y, bound, m
                     for axis in range(3):
                         c[count, axis] = normal[axis]
                     count += 1
@@ -397,9 +400,8 @@ def active_set(
     array(2),
     array(1),
     *[array(2)] * 2,
-    INT,
-    output(2),
-    output(1),
+    array(1, INT),
+    *[output(2)] * 2,
 )
 def combine(
     start: Array,
@@ -412,20 +414,21 @@ def combine(
     low: Array,
     x_min: Array,
     x_max: Array,
-    planes: int,
+    whose: NDArray[np.int64],
     x: Array,
-    push: Array,
+    forces: Array,
 ) -> float:
     """Write the minimiser ``x`` (3, n) for the ``multipliers`` (C,) of the ``active`` constraints.
 
-    ``push`` (3,) is the sum of the normals times the multipliers of the first ``planes`` rows. Returned is
-    the largest violation of a row or bound (m, m/s, m/s²); ∞ if a multiplier is negative by more than
-    rounding, as x is not the minimiser then.
+    The first rows are those of planes, of which ``whose`` (P,) names the obstacles: ``forces`` (M, 3) of
+    these are the sums of the normals times the multipliers. Returned is the largest violation of a row or
+    bound (m, m/s, m/s²); ∞ if a multiplier is negative by more than rounding, as x is not the minimiser then.
     """
     n, worst, largest = start.shape[1], 0.0, 1.0
     _copy(start, x)
-    for axis in range(3):
-        push[axis] = 0.0
+    for m in range(len(forces)):
+        for axis in range(3):
+            forces[m, axis] = 0.0
     for k in range(len(multipliers)):
         largest = max(largest, multipliers[k])
     for k in range(len(multipliers)):
@@ -434,8 +437,8 @@ def combine(
         for axis in range(3):
             for i in range(n):
                 x[axis, i] += multipliers[k] * images[k, axis, i]
-            if active[k] < planes:
-                push[axis] += max(multipliers[k], 0.0) * c[active[k], axis]
+            if active[k] < len(whose):
+                forces[whose[active[k]], axis] += max(multipliers[k], 0.0) * c[active[k], axis]
     results = np.empty((5 * n, 3))
     _motion(x, 0.0, dt, results)
     for r in range(len(low)):

@@ -32,7 +32,8 @@ from tests.outrider.shipped import scenario
 
 KEYS = {
     "scenario", "method", "avoidance", "planar", "turning_sense", "seed", "vehicles", "sensors",
-    "converged", "convergence_time_s", "others_converge_s", "min_separation_m",
+    "converged", "convergence_time_s", "others_converge_s", "covered_goals", "uncovered_converge_s",
+    "min_separation_m",
     "min_obstacle_distance_m", "d_min_m", "d_min_violations", "max_speed_m_s", "max_acceleration_m_s2",
     "max_tilt_deg", "yaw_error_deg", "standoff_error_m", "plan_ms", "plans", "solver_failures",
     "held_epochs", "slack_max_m", "tracking_error_m", "messages", "deadline_misses", "deadline_steps",
@@ -83,6 +84,8 @@ class Flown:
     clock_end: int | None = 800_000
     converged_at: int | None = 500_000
     others_converged_at: int | None = 400_000
+    able_converged_at: int | None = 300_000
+    covered: int = 1
     failure: str | None = None
     span: float = 0.63
     tallies: Any = TALLIES
@@ -138,7 +141,11 @@ def test_times() -> None:
     assert (found["converged"], found["convergence_time_s"]) == (True, 0.3)
     assert found["simulated_s"] == pytest.approx(0.98)
     assert (found["wall_s"], found["cpu_s"], found["real_time_factor"]) == (2.0, 1.5, 0.49)
-    assert found["others_converge_s"] == 0.2
+    assert (found["others_converge_s"], found["uncovered_converge_s"], found["covered_goals"]) == (
+        0.2,
+        0.1,
+        1,
+    )
     stuck = summary(converged_at=None)
     assert (stuck["converged"], stuck["convergence_time_s"], stuck["others_converge_s"]) == (False, None, 0.2)
     escort = summary(scenario=scenario(ESCORT, vehicles=2), converged_at=None)

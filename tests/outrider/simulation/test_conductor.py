@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from companion.avoidance.certified.margins import between
 from mavlink_bridge.frames import FleetFrame
 from outrider.runs.ground_truth import SAMPLE
+from outrider.scenarios.companion_settings import settings_of
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import starts
 from outrider.simulation.conductor import HOLD, Conductor, Observation, Stage
@@ -103,6 +105,41 @@ def test_others_converge_without_those_whose_companion_ends_for_good() -> None:
     run.show(1.0, run.starts.positions)
     assert run.show(20.0, run.starts.positions)
     assert run.conductor.others_converged_at is None
+
+
+def test_a_goal_where_a_vehicle_rests_whose_companion_has_ended_is_counted_and_not_waited_for() -> None:
+    faults = [{"kind": "vanish", "vehicle": 12, "at_s": 1.0}]
+    certified = {"avoidance": "certified"}
+    changes = {"vehicles": 3, "airborne": True, "cap_s": 10.0, "faults": faults, "companion": certified}
+    of = scenario("antipodal-8", **changes, sensors="rtk")
+    config = settings_of(of)
+    least = between(config.certified, config.field, config.limits)
+    for off, covered in ((least - 0.31, 1), (least - 0.29, 0)):
+        run = Run(of)
+        starts, goals = run.starts.positions, run.starts.goals
+        assert goals is not None
+        run.show(1.0, starts)
+        # The third vehicle cannot get nearer than 0.3 m to its goal, in the first case.
+        places = np.array([goals[0], goals[2] + [off, 0.0, 0.0], goals[2] + [off, least, 0.0]])
+        run.show(0.4, places)
+        assert run.conductor.covered == 0
+        assert run.show(20.0, places)
+        assert run.conductor.covered == covered
+        assert run.conductor.others_converged_at is None
+        start = run.conductor.clock_start
+        assert start is not None
+        assert run.conductor.able_converged_at == (start + 1_000_000 if covered else None)
+
+
+def test_a_companion_that_restarts_is_given_the_go_and_the_goal_again() -> None:
+    faults = [{"kind": "restart", "vehicle": 12, "at_s": 1.0, "for_s": 0.5}]
+    run = Run(scenario("antipodal-8", vehicles=2, airborne=True, cap_s=10.0, faults=faults))
+    run.show(1.0, run.starts.positions)
+    run.operator._open.clear()
+    run.show(0.9, run.starts.positions)
+    assert run.orders() == set()
+    run.show(0.2, run.starts.positions)
+    assert run.orders() == {22, 192}
 
 
 def test_who_does_not_converge_is_flown_to_the_cap() -> None:

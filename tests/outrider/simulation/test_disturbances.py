@@ -17,6 +17,7 @@ Call = tuple[Any, ...]
 
 FREEZE = {"kind": "freeze", "vehicle": 12, "at_s": 3.0, "for_s": 1.5}
 VANISH = {"kind": "vanish", "vehicle": 11, "at_s": 5.0}
+RESTART = {"kind": "restart", "vehicle": 13, "at_s": 2.0, "for_s": 1.5}
 LOSS = {"kind": "gps_loss", "vehicle": 11, "at_s": 1.0, "for_s": 2.0}
 JUMP = {"kind": "gps_jump", "vehicle": 12, "at_s": 1.0, "for_s": 2.0, "offset": [1.0, 2.0, 3.0]}
 MOTOR = {"kind": "motor", "vehicle": 13, "at_s": 0.5, "rotor": 2, "left": 0.25}
@@ -54,6 +55,7 @@ def struck(*faults: dict[str, Any], partitions: tuple[dict[str, Any], ...] = ())
     [
         (FREEZE, [(3_000_000, ("freeze", 12)), (4_500_000, ("thaw", 12))]),
         (VANISH, [(5_000_000, ("vanish", 11))]),
+        (RESTART, [(2_000_000, ("end", 13)), (3_500_000, ("restart", 13))]),
         (LOSS, [(1_000_000, ("lose_gps",)), (3_000_000, ("regain_gps",))]),
         (JUMP, [(1_000_000, ("shift_gps", (1.0, 2.0, 3.0))), (3_000_000, ("shift_gps", (0.0, 0.0, 0.0)))]),
         (MOTOR, [(500_000, ("fail_rotor", 2, 0.5))]),
@@ -72,14 +74,14 @@ def test_a_partition_heals() -> None:
 
 
 @settings(deadline=None)
-@given(st.permutations([FREEZE, VANISH, LOSS, JUMP, MOTOR, UTC, STEP]))
+@given(st.permutations([FREEZE, VANISH, RESTART, LOSS, JUMP, MOTOR, UTC, STEP]))
 def test_they_come_in_the_order_of_time(faults: list[dict[str, Any]]) -> None:
     of = scenario("antipodal-8", vehicles=3, faults=faults, partitions=(CUT,))
     found = events(of)
     assert [event.after for event in found] == sorted(event.after for event in found)
     begun = {id(event.what) for event in found if not event.over}
     assert begun == {id(event.what) for event in found}
-    assert len(found) == 12
+    assert len(found) == 14
     assert isinstance(found[0], Event)
 
 
@@ -129,7 +131,7 @@ def spell(what: dict[str, Any], begin: float, lasts: float) -> dict[str, Any]:
     return {**what, "at_s": begin, "for_s": lasts}
 
 
-@pytest.mark.parametrize("what", [FREEZE, LOSS, JUMP, CUT])
+@pytest.mark.parametrize("what", [FREEZE, RESTART, LOSS, JUMP, CUT])
 @given(st.tuples(st.integers(0, 8), st.integers(1, 8)), st.tuples(st.integers(0, 8), st.integers(1, 8)))
 @settings(deadline=None, max_examples=30)
 def test_of_one_kind_one_goes_after_the_other(

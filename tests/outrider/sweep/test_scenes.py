@@ -281,10 +281,13 @@ def struck(seed: int, **trouble: Any) -> dict[str, Any]:
     return draw(scene("certified-fuzz", trouble={**base, **trouble}), seed)
 
 
+NEITHER: dict[str, Any] = {"gusts": [0, 0], "jumps": [0, 0]}
+
+
 def test_gusts_and_jumps_are_as_many_and_as_strong_as_the_scene_allows_and_change_nothing_else() -> None:
     gusts, jumps = set(), set()
     for seed in range(1, 41):
-        document, without = struck(seed), struck(seed, gusts=[0, 0], jumps=[0, 0])
+        document, without = (struck(seed, restarts=[0, 0], **few) for few in ({}, NEITHER))
         sigma = PROFILES[document["sensors"]].worst_axis
         blown = document["weather"].pop("gusts")
         jumped = [fault for fault in document["faults"] if fault["kind"] == "gps_jump"]
@@ -296,3 +299,16 @@ def test_gusts_and_jumps_are_as_many_and_as_strong_as_the_scene_allows_and_chang
         gusts.add(len(blown))
         jumps.add(len(jumped))
     assert gusts == jumps == {0, 1, 2}
+
+
+def test_restarts_are_those_of_companions_that_neither_hang_nor_vanish_and_change_nothing_else() -> None:
+    numbers = set()
+    for seed in range(1, 31):
+        document, without = struck(seed, restarts=[0, 2]), struck(seed, restarts=[0, 0])
+        restarts = [fault for fault in document["faults"] if fault["kind"] == "restart"]
+        others = [fault for fault in document["faults"] if fault["kind"] != "restart"]
+        silent = {fault["vehicle"] for fault in others if fault["kind"] in ("freeze", "vanish")}
+        assert silent.isdisjoint(fault["vehicle"] for fault in restarts)
+        assert {**document, "faults": others} == without
+        numbers.add(len(restarts))
+    assert numbers == {0, 1, 2}

@@ -7,7 +7,7 @@ from typing import Final, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.backup_node import LINKS, accepts
+from companion.backup_node import LINKS, accepts, accepts_peers
 from companion.flight.hold_on_exit import HoldOnExit
 from companion.telemetry.reception import LINKS as COMPANION_LINKS
 from mavlink_bridge.key import Key
@@ -45,6 +45,10 @@ class Backup(Protocol):
         """Return the newest plan, and the statement that it is the last one."""
         ...
 
+    def hear(self, now: int, messages: Sequence[Message]) -> None:
+        """Take note of the others' plans at ``now`` (µs)."""
+        ...
+
     def rests(self, now: int, settling: int) -> bool:
         """Return whether no plan is flown, or it has been at rest for ``settling`` at ``now`` (µs)."""
         ...
@@ -61,9 +65,9 @@ class Backup(Protocol):
 class BackupPilot:
     """``Node`` of the backup process of ``system``.
 
-    Links: ``copies`` (records of ``backup_copies``) and ``autopilot``, the physical link, to be read only
-    while ``deaf``; it sends on ``autopilot`` and ``swarm``. ``signing`` is that of ``backup``; ``key``: for
-    the hold request, which has the companion's ids.
+    Links: ``copies`` (records of ``backup_copies``), and the physical links ``autopilot``, to be read only
+    while ``deaf``, and ``swarm``, to be read only while ``gone``; it sends on both. ``signing`` is that of
+    ``backup``; ``key``: for the hold request, which has the companion's ids.
 
     ``gone``: set it to True when the companion's process has ended or flies no more. Then the plan is flown
     to its end at rest, the others are told that it is the last, and the hold is requested; ``over`` tells the
@@ -85,7 +89,7 @@ class BackupPilot:
             ),
             signing,
         )
-        self._swarm = Codec(None, signing, COMPANION_LINKS.index("swarm"))
+        self._swarm = Codec(accepts_peers(system), signing, COMPANION_LINKS.index("swarm"))
         self._next_farewell = 0
         self._beat: Heartbeat | None = None
         self._beat_at = 0
@@ -112,6 +116,8 @@ class BackupPilot:
                 self._receive(copies.time, self._copied(copies))
             elif link == "autopilot":
                 self._receive(now, self._read.feed(data))
+            elif link == "swarm" and self.gone:
+                self._backup.hear(now, self._swarm.feed(data))
         self._heard = now if self._heard is None else self._heard
         self.deaf = self.gone or now - self._heard > DEAF_US
         if self._holds and not self.deaf:

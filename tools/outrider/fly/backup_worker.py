@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import traceback
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
@@ -120,8 +121,8 @@ class BackupWorker:
             Scheduled(pilot, asked.config.period_us),
             {
                 "copies": self._copies,
-                "autopilot": _WhenDeaf(self._wiring.physical("autopilot"), pilot),
-                "swarm": _SendOnly(self._wiring.physical("swarm")),
+                "autopilot": _WhenDeaf(self._wiring.physical("autopilot"), lambda: pilot.deaf),
+                "swarm": _WhenDeaf(self._wiring.physical("swarm"), lambda: pilot.gone),
                 "orders": orders,
             },
             self._clock,
@@ -145,33 +146,6 @@ def backup_of(asked: Request, signing: Signing | None) -> Backup:
     return FleetTimeBackup(system, lambda: BackupNode(config, system, frame, signing, finishes=True), signing)
 
 
-class _SendOnly:
-    """``Link`` that is never read, because the companion reads it."""
-
-    def __init__(self, link: Link) -> None:
-        self._link = link
-
-    @property
-    def counters(self) -> LinkCounters:
-        """Counters of the physical link."""
-        return self._link.counters
-
-    def fileno(self) -> None:
-        """Return None: nothing is received."""
-
-    def receive(self) -> list[bytes]:
-        """Return an empty list."""
-        return []
-
-    def send(self, data: bytes) -> None:
-        """Send ``data``."""
-        self._link.send(data)
-
-    def close(self) -> None:
-        """Close the physical link in this process."""
-        self._link.close()
-
-
 class _SwarmTap:
     """Observer that logs as the companion's what it receives and sends on the swarm link.
 
@@ -185,14 +159,14 @@ class _SwarmTap:
         """Do nothing: the times of steps are not needed."""
 
     def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        """Log ``datagram`` if it is sent on the swarm link, or the copies that it holds."""
+        """Log ``datagram`` if it is of the swarm link, or the copies that it holds."""
         if datagram.link == "copies":
             copies = unpack(datagram.data)
             # A backup process that was stopped reads old copies.
             self._add(copies.time, "in", copies.heard)
             self._add(copies.time, "out", copies.swarm)
-        elif (datagram.link, direction) == ("swarm", "out"):
-            self._add(now, "out", datagram.data)
+        elif datagram.link == "swarm":
+            self._add(now, direction, datagram.data)
 
     def _add(self, now: int, direction: Direction, data: bytes) -> None:
         if data:
@@ -200,10 +174,10 @@ class _SwarmTap:
 
 
 class _WhenDeaf:
-    """``Link`` to the autopilot that is read only while the companion does not read it."""
+    """``Link`` that is read only while the companion is ``deaf``, which does not read it then."""
 
-    def __init__(self, link: Link, pilot: BackupPilot) -> None:
-        self._link, self._pilot = link, pilot
+    def __init__(self, link: Link, deaf: Callable[[], bool]) -> None:
+        self._link, self._deaf = link, deaf
 
     @property
     def counters(self) -> LinkCounters:
@@ -215,7 +189,7 @@ class _WhenDeaf:
 
     def receive(self) -> list[bytes]:
         """Return what has arrived, if the companion is deaf."""
-        return self._link.receive() if self._pilot.deaf else []
+        return self._link.receive() if self._deaf() else []
 
     def send(self, data: bytes) -> None:
         """Send ``data``."""

@@ -166,6 +166,8 @@ class RealTimeFlight:
             conductor.clock_end,
             conductor.converged_at,
             conductor.others_converged_at,
+            conductor.able_converged_at,
+            conductor.covered,
             conductor.failure,
             [found.tallies or (_NO_TALLY, _NO_TALLY) for found in companions],
             Messages(
@@ -272,7 +274,8 @@ class _Leader:
                 board.gone[k] = 1
             conductor.abort(now, f"the process of {name} ended with status {status}")
 
-    # Faults of companions' computers; each companion's process applies partitions and steps of its clock.
+    # Faults of companions' computers; each companion's process applies partitions, steps of its clock, and
+    # restarts.
 
     def freeze(self, system: int) -> None:
         self._processes.freeze(names.companion(system))
@@ -284,6 +287,12 @@ class _Leader:
 
     def vanish(self, system: int) -> None:
         self._board.gone[self._fleet.systems.index(system)] = 1
+
+    def end(self, system: int) -> None:
+        pass
+
+    def restart(self, system: int) -> None:
+        pass
 
     def step_clock(self, system: int, by: int) -> None:
         pass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 
 from mavlink_bridge.clocks.clock import Clock
@@ -15,9 +16,10 @@ from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.wiring import Wiring
 from outrider.realtime.workers import AutopilotWorker, CompanionWorker, NodeEnvironment, PlayedWorker, Worker
 from outrider.runs import names
-from outrider.scenarios.faults import ClockStep
+from outrider.scenarios.faults import ClockStep, Restart
 from outrider.scenarios.links import PartitionPart
 from outrider.simulation.disturbances import events
+from outrider.simulation.ending_companion import EndingCompanion
 from outrider.simulation.fleet import Fleet
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.targets import Target
@@ -36,9 +38,10 @@ def spawn(
     cuts = [event for event in happening if isinstance(event.what, PartitionPart)]
     workers: list[Worker] = []
     for k, system in enumerate(fleet.systems):
-        autopilot, companion = fleet.autopilot(k), fleet.companion(k, time.thread_time_ns, start)
+        autopilot = fleet.autopilot(k)
+        companion = EndingCompanion(partial(fleet.companion, k, time.thread_time_ns, start))
         own = [event for event in happening if getattr(event.what, "vehicle", None) == system]
-        steps = [event for event in own if isinstance(event.what, ClockStep)]
+        computers = [event for event in own if isinstance(event.what, ClockStep | Restart)]
         behind = rough(fleet, autopilot, {"autopilot": companion.name})
         first, phase, its_clock = turns(fleet, k, start)
         every = Scheduled(behind, timing.autopilot_us, first)
@@ -63,7 +66,7 @@ def spawn(
                 system,
                 logs,
                 NodeEnvironment(behind, every, wiring.companions[k], clock, board),
-                sorted([*cuts, *steps], key=lambda event: event.after),
+                sorted([*cuts, *computers], key=lambda event: event.after),
             )
         )
     for index, k in enumerate(fleet.with_backup):

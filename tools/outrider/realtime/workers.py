@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from companion.avoidance.field.plan_log import PlanLog
-from companion.node import Companion
 from companion.planning.avoidance import Tally
 from companion.values.phase import Phase
 from mavlink_bridge.clocks.clock import Clock
@@ -37,6 +36,7 @@ from outrider.scene.companion_snapshot import companion_snapshot
 from outrider.scene.view_commands import LOSSY
 from outrider.simulation.bystander import Bystander
 from outrider.simulation.disturbances import Event, strike_autopilot, strike_computer
+from outrider.simulation.ending_companion import EndingCompanion
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.system_clocks import step_clock
 from outrider.simulation.targets import Target
@@ -208,7 +208,13 @@ class CompanionWorker(Worker):
     """A companion; it writes its vehicle's tlog to ``logs``."""
 
     def __init__(
-        self, k: int, node: Companion, system: int, logs: Path, slot: NodeEnvironment, events: Iterable[Event]
+        self,
+        k: int,
+        node: EndingCompanion,
+        system: int,
+        logs: Path,
+        slot: NodeEnvironment,
+        events: Iterable[Event],
     ) -> None:
         super().__init__(slot, events)
         self._k, self._node = k, node
@@ -233,14 +239,14 @@ class CompanionWorker(Worker):
         self._first = self._node.tally
 
     def strike(self, event: Event) -> None:
-        """Apply a partition to the companion's links, or a step to its system clock."""
+        """Apply a partition to the companion's links, a step to its system clock, or a restart to it."""
         strike_computer(event, _OwnComputer(self.rough, self._node))
 
     def show(self, now: int) -> None:
         """Write the companion's state to the board and, if there is one, to the view."""
         if self.board.end and self._last is None:
             self._last = self._node.tally
-        pilot = self._node.pilot
+        pilot = self._node.companion.pilot
         shown = pilot.phase is Phase.ESCORT, pilot.waiting_for + (f" ({pilot.said})" if pilot.said else "")
         if shown != self._shown:
             self._shown = shown
@@ -251,12 +257,13 @@ class CompanionWorker(Worker):
 
     def _update_view(self, now: int, window: Window) -> None:
         """Write the node's snapshot for the view, and apply the view's commands."""
-        window.show_companion(self._k, companion_snapshot(self._node, now))
+        window.show_companion(self._k, companion_snapshot(self._node.companion, now))
         if window.commands == self._commands:
             return
         self._commands = window.commands
-        if window.methods and not isinstance(self._node, Bystander):
-            self._node.use(window.methods)
+        companion = self._node.companion
+        if window.methods and not isinstance(companion, Bystander):
+            companion.use(window.methods)
         if window.loss is not None:
             self.rough.network.lose(LOSSY, window.loss)
 
@@ -264,8 +271,8 @@ class CompanionWorker(Worker):
         """Write the results, with tallies and plan log."""
         now = self._node.tally
         self.remains.tallies = (self._first or now, self._last or now)
-        self.remains.bad = self._node.bad_frames
-        self.remains.plan_log = self._node.plan_log
+        self.remains.bad = self._node.companion.bad_frames
+        self.remains.plan_log = self._node.companion.plan_log
         super().leave(path)
 
     def taps(self, files: ExitStack) -> list[StepObserver]:
@@ -294,12 +301,12 @@ class PlayedWorker(Worker):
 
 
 class _OwnComputer:
-    """Partitions of the swarm, and steps of the system clock, for one companion.
+    """Partitions of the swarm, steps of the system clock, and restarts, for one companion.
 
     The parent applies freezes and losses of processes.
     """
 
-    def __init__(self, rough: ImpairedLink, companion: Companion) -> None:
+    def __init__(self, rough: ImpairedLink, companion: EndingCompanion) -> None:
         self._rough, self._companion = rough, companion
 
     def freeze(self, system: int) -> None:
@@ -311,8 +318,14 @@ class _OwnComputer:
     def vanish(self, system: int) -> None:
         """Do nothing: the process ends by ``SharedPage.gone``."""
 
+    def end(self, system: int) -> None:
+        self._companion.end()
+
+    def restart(self, system: int) -> None:
+        self._companion.restart()
+
     def step_clock(self, system: int, by: int) -> None:
-        step_clock(self._companion, by)
+        step_clock(self._companion.companion, by)
 
     def cut(self, systems: tuple[int, ...]) -> None:
         self._rough.cut(map(names.companion, systems))

@@ -27,6 +27,12 @@ TERMS = {
     "others_converge_s": Term(
         "others converge", "s", "the same without the vehicles whose companion ends for good"
     ),
+    "covered_goals": Term(
+        "covered goals", "", "of the others, nearer than the least distance to where such a vehicle rests"
+    ),
+    "uncovered_converge_s": Term(
+        "others with a free goal converge", "s", "the same also without the vehicles with covered goals"
+    ),
     "failure": Term("failure", "", "reason why the flight failed, or vehicles that fell or did not land"),
     "min_separation_m": Term(
         "least separation", "m", "of two vehicles' centres, true, at every physics step"

@@ -41,8 +41,9 @@ class Outcome:
 
     ``clock_start``: goal event, from which the time of the flight counts ("the clock"); ``clock_end``: end of
     this time, before the landing. ``converged_at``: start of the convergence. ``others_converged_at``:
-    the same without the vehicles whose companion ends for good. ``span`` (m): a vehicle's size from tip to
-    tip. ``tallies``: for each companion its counters at ``clock_start`` and at ``clock_end``.
+    the same without the vehicles whose companion ends for good. ``able_converged_at``: the same also without
+    those whose goals are ``covered`` (their number), see ``CoveredGoals``. ``span`` (m): a vehicle's size
+    from tip to tip. ``tallies``: for each companion its counters at ``clock_start`` and at ``clock_end``.
     ``punctuality`` is that of a real-time run; lock-step has none. ``plan_logs``: per companion, on its own
     clock.
     """
@@ -57,6 +58,8 @@ class Outcome:
     clock_end: int | None
     converged_at: int | None
     others_converged_at: int | None
+    able_converged_at: int | None
+    covered: int
     failure: str | None
     tallies: list[tuple[Tally, Tally]]
     messages: Messages

@@ -45,10 +45,12 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
     converged: bool | None = None
     seconds: float | None = None
     others: float | None = None
+    able: float | None = None
     if scenario.has_goal:
         converged = flight.converged_at is not None
         seconds = _since(start, flight.converged_at)
         others = _since(start, flight.others_converged_at)
+        able = _since(start, flight.able_converged_at)
     late = flight.punctuality
     near_target = truth.target.minimum if scenario.d_min_target is not None else float("inf")
     return {
@@ -63,6 +65,8 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "converged": converged,
         "convergence_time_s": seconds,
         "others_converge_s": others,
+        "covered_goals": flight.covered,
+        "uncovered_converge_s": able,
         "min_separation_m": _finite(truth.vehicles.minimum),
         "min_obstacle_distance_m": _finite(truth.obstacles.minimum),
         "min_target_distance_m": _finite(near_target),

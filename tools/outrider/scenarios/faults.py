@@ -30,6 +30,16 @@ class Vanish(_Fault):
     kind: Literal["vanish"]
 
 
+class Restart(_Fault):
+    """End of the companion, and ``for_s`` later another one with the same id.
+
+    It knows nothing of the flight; the operator gives it the go and the goal again.
+    """
+
+    kind: Literal["restart"]
+    for_s: Duration
+
+
 class GpsLoss(_Fault):
     """Loss of the autopilot's position fix for a while."""
 
@@ -91,7 +101,7 @@ class ClockStep(_Fault):
     step_ms: float = Field(ge=-600_000.0, le=600_000.0)
 
 
-Sudden = Freeze | Vanish | GpsLoss | GpsJump | MotorFailure | UtcStep | ClockStep
+Sudden = Freeze | Vanish | Restart | GpsLoss | GpsJump | MotorFailure | UtcStep | ClockStep
 """Faults that occur at a certain time."""
 FromStart = ClockFault | AutopilotClockFault
 """Faults that last the whole flight."""
@@ -104,6 +114,8 @@ def description(fault: Sudden) -> str:
         return "its companion hangs"
     if isinstance(fault, Vanish):
         return "its companion is gone for good"
+    if isinstance(fault, Restart):
+        return "its companion ends, and another one begins"
     if isinstance(fault, GpsLoss):
         return "its position fix is lost"
     if isinstance(fault, GpsJump):

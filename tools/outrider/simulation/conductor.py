@@ -13,9 +13,10 @@ import numpy as np
 
 from outrider.runs.formation_error import standoff
 from outrider.runs.ground_truth import Array
-from outrider.scenarios.faults import Vanish
+from outrider.scenarios.faults import Restart
 from outrider.scenarios.scenario import FixedTarget, Scenario
 from outrider.scenarios.starts import Starts
+from outrider.simulation.covered_goals import CoveredGoals
 from outrider.simulation.operator import Operator
 from sitl.estimation.profiles import PROFILES
 
@@ -81,6 +82,19 @@ def _intruders(scenario: Scenario) -> list[_Intruder]:
     return sorted(found, key=lambda intruder: intruder.after)
 
 
+class _Successor(NamedTuple):
+    """A companion that begins ``after`` µs after the goal event, in place of one that has ended."""
+
+    after: int
+    system: int
+
+
+def _successors(scenario: Scenario) -> list[_Successor]:
+    """Return the companions that begin in flight, sorted by their beginnings."""
+    restarts = [fault for fault in scenario.faults if isinstance(fault, Restart)]
+    return sorted(_Successor(round(1e6 * (one.at_s + one.for_s)), one.vehicle) for one in restarts)
+
+
 class _Arrival:
     """Arrival of several vehicles: ``at`` (µs) is the first time from which on all stay for ``HOLD``."""
 
@@ -124,14 +138,18 @@ class Conductor:
         self.clock_end: int | None = None
         self.failure: str | None = None
         self._calm_since: int | None = None
-        self._all, self._others = _Arrival(), _Arrival()
-        vanishing = {fault.vehicle for fault in scenario.faults if isinstance(fault, Vanish)}
-        self._lasting = np.array([s not in vanishing for s in scenario.systems[: scenario.vehicles]])
+        self._all, self._others, self._able = _Arrival(), _Arrival(), _Arrival()
+        self._goals = CoveredGoals(scenario, starts.goals, self.near)
+        self.covered = 0
+        """Number of goals that a vehicle whose companion has ended for good keeps the others from."""
         self._land_at = 0
         target = scenario.target
         jumps = target.jumps if isinstance(target, FixedTarget) else ()
         self._last_jump = round(1e6 * jumps[-1].after_s) if jumps else 0
         self._intruders = deque(_intruders(scenario))
+        self._successors = deque(_successors(scenario))
+        self._ordered: dict[int, Array] = {}
+        """Goals (3,) that were ordered, by system id."""
         self._turning = _turning_speed(scenario)
         for k, system in enumerate(scenario.systems):
             operator.take_off(system, float(starts.positions[k, 2]))
@@ -145,6 +163,11 @@ class Conductor:
     def others_converged_at(self) -> int | None:
         """Time (µs) from which on all vehicles have arrived whose companion does not end for good."""
         return self._others.at
+
+    @property
+    def able_converged_at(self) -> int | None:
+        """Time (µs) from which on all those of ``others_converged_at`` have arrived whose goals are free."""
+        return self._able.at
 
     @property
     def near(self) -> float:
@@ -205,19 +228,39 @@ class Conductor:
         self.stage, self.clock_start = Stage.CLOCK, now
         if self._starts.goals is not None:
             for system, goal in zip(self._scenario.systems, self._starts.goals, strict=False):
-                self._operator.goal(system, goal)
+                self._order(system, goal)
+
+    def _order(self, system: int, goal: Array) -> None:
+        self._ordered[system] = goal
+        self._operator.goal(system, goal)
+
+    def _order_again(self, system: int) -> None:
+        """Give the go and the goal to a companion that has just begun."""
+        height = float(self._starts.positions[self._scenario.systems.index(system), 2])
+        self._operator.take_off(system, height)
+        if system in self._ordered:
+            self._operator.goal(system, self._ordered[system])
 
     def _count(self, sight: Observation) -> None:
         now = sight.now
         since = now - (self.clock_start or 0)
         while self._intruders and self._intruders[0].after <= since:
             _, system, goal = self._intruders.popleft()
-            self._operator.goal(system, goal)
+            self._order(system, goal)
+        while self._successors and self._successors[0].after <= since:
+            self._order_again(self._successors.popleft().system)
         if self._scenario.has_goal and since >= self._last_jump:
             speeds = np.linalg.norm(sight.velocities[: self._scenario.vehicles], axis=1)
             arrived = (self.errors(sight) < self.near) & (speeds < SLOW)
+            lasting, covered = (
+                self._goals.lasting,
+                self._goals.covered(since, sight.positions, sight.velocities),
+            )
+            self.covered = int(covered.sum())
             self._all.see(now, arrived=bool(arrived.all()))
-            self._others.see(now, arrived=bool(self._lasting.any() and arrived[self._lasting].all()))
+            self._others.see(now, arrived=bool(lasting.any() and arrived[lasting].all()))
+            able = lasting & ~covered
+            self._able.see(now, arrived=bool(able.any() and arrived[able].all()))
         over = since >= self._scenario.duration_s * 1e6
         if self.converged_at is not None:
             over = now >= self.converged_at + HOLD + _TIME_AFTER_CONVERGENCE_US

@@ -12,6 +12,7 @@ from outrider.scenarios.faults import (
     GpsJump,
     GpsLoss,
     MotorFailure,
+    Restart,
     Sudden,
     UtcStep,
     Vanish,
@@ -42,6 +43,14 @@ class Computers(Protocol):
 
     def vanish(self, system: int) -> None:
         """Remove the companion of ``system`` for good."""
+        ...
+
+    def end(self, system: int) -> None:
+        """End the companion of ``system`` until ``restart``."""
+        ...
+
+    def restart(self, system: int) -> None:
+        """Start another companion of ``system``."""
         ...
 
     def step_clock(self, system: int, by: int) -> None:
@@ -99,6 +108,11 @@ def strike_computer(event: Event, computers: Computers) -> None:
                 computers.freeze(system)
         case Vanish(vehicle=system):
             computers.vanish(system)
+        case Restart(vehicle=system):
+            if event.over:
+                computers.restart(system)
+            else:
+                computers.end(system)
         case ClockStep(vehicle=system, step_ms=step):
             computers.step_clock(system, round(1000.0 * step))
         case PartitionPart(members=systems):

@@ -115,6 +115,8 @@ class Flight:
             conductor.clock_end,
             conductor.converged_at,
             conductor.others_converged_at,
+            conductor.able_converged_at,
+            conductor.covered,
             conductor.failure,
             list(zip(at_start, at_end, strict=True)),
             Messages(

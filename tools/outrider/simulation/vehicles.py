@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from companion.node import Companion
 from companion.planning.avoidance import Tally
 from companion.values.phase import Phase
 from mavlink_bridge.loops.garbage import seldom_collected
@@ -98,13 +98,12 @@ class Vehicles:
         self.indices = share.vehicles(scenario.size)
         self.systems = [fleet.systems[k] for k in self.indices]
         self.autopilots = [fleet.autopilot(k) for k in self.indices]
-        self.companions = [fleet.companion(k, stopwatch, EPOCH) for k in self.indices]
         self.backup_nodes = {k: fleet.backup_of(k) for k in self.indices if k in fleet.with_backup}
-        self._ending = {
-            fleet.systems[k]: EndingCompanion(companion, self.backup_nodes[k])
-            for k, companion in zip(self.indices, self.companions, strict=True)
-            if k in self.backup_nodes
-        }
+        self._nodes = [
+            EndingCompanion(partial(fleet.companion, k, stopwatch, EPOCH), self.backup_nodes.get(k))
+            for k in self.indices
+        ]
+        self.companions = [node.companion for node in self._nodes]
         nodes: list[Node] = [*self.autopilots, *self.companions, *self.backup_nodes.values()]
         own = {node.name for node in nodes}
         if share.number == 0:
@@ -145,8 +144,7 @@ class Vehicles:
                 taps,
                 elsewhere=elsewhere,
             )
-            by_system = dict(zip(self.systems, self.companions, strict=True))
-            computers = _Computers(loop, self.network, by_system, self._ending)
+            computers = _Computers(loop, self.network, self)
 
             def watched(now: int) -> bool | None:
                 self._strike_due(now, computers)
@@ -206,19 +204,28 @@ class Vehicles:
 
     @property
     def tallies(self) -> list[Tally]:
-        """Counters of the companions."""
-        return [companion.tally for companion in self.companions]
+        """Counters of the companions, with those that have ended."""
+        return [node.tally for node in self._nodes]
+
+    def node(self, system: int) -> EndingCompanion | None:
+        """Return the node of the companion of ``system``; None if another process steps it."""
+        return self._nodes[self.systems.index(system)] if system in self.systems else None
+
+    def restart(self, system: int) -> None:
+        """Replace the companion of ``system``, which has ended, by another one."""
+        if system in self.systems:
+            k = self.systems.index(system)
+            self.companions[k] = self._nodes[k].restart()
 
     def _schedule(self) -> list[Scheduled]:
         """Return the schedule of all vehicles; each companion has its own phase and clock."""
         timing, fleet = self._scenario.timing, self._fleet
         autopilots = dict(zip(self.indices, self.autopilots, strict=True))
-        companions = dict(zip(self.indices, self.companions, strict=True))
+        companions = dict(zip(self.indices, self._nodes, strict=True))
         nodes = []
         for k, (system, phase) in enumerate(zip(fleet.systems, fleet.phases(), strict=True)):
             autopilot = autopilots.get(k) or Elsewhere(names.autopilot(system))
-            ending, elsewhere = self._ending.get(system), Elsewhere(names.companion(system))
-            companion = ending or companions.get(k) or elsewhere
+            companion = companions.get(k) or Elsewhere(names.companion(system))
             nodes.append(Scheduled(autopilot, timing.autopilot_us, EPOCH))
             nodes.append(Scheduled(companion, timing.companion_us, EPOCH + phase, fleet.clock(k, EPOCH)))
         for k in fleet.with_backup:
@@ -248,15 +255,8 @@ class Vehicles:
 class _Computers:
     """The companions' computers in lock-step."""
 
-    def __init__(
-        self,
-        loop: LockStep,
-        network: NetworkPart,
-        companions: Mapping[int, Companion],
-        ending: Mapping[int, EndingCompanion],
-    ) -> None:
-        self._loop, self._network, self._companions = loop, network, companions
-        self._ending = ending
+    def __init__(self, loop: LockStep, network: NetworkPart, vehicles: Vehicles) -> None:
+        self._loop, self._network, self._vehicles = loop, network, vehicles
 
     def freeze(self, system: int) -> None:
         self._loop.freeze(names.companion(system))
@@ -265,15 +265,25 @@ class _Computers:
         self._loop.thaw(names.companion(system))
 
     def vanish(self, system: int) -> None:
-        if system in self._ending:
-            self._loop.thaw(names.companion(system))
-            self._ending[system].end()
-        else:
+        node = self._vehicles.node(system)
+        if node is None or not node.has_backup:
             self._loop.vanish(names.companion(system))
+        else:
+            self.end(system)
+
+    def end(self, system: int) -> None:
+        node = self._vehicles.node(system)
+        if node is not None:
+            self._loop.thaw(names.companion(system))
+            node.end()
+
+    def restart(self, system: int) -> None:
+        self._vehicles.restart(system)
 
     def step_clock(self, system: int, by: int) -> None:
-        if system in self._companions:
-            step_clock(self._companions[system], by)
+        node = self._vehicles.node(system)
+        if node is not None:
+            step_clock(node.companion, by)
 
     def cut(self, systems: tuple[int, ...]) -> None:
         self._network.cut("swarm", map(names.companion, systems))

@@ -50,6 +50,9 @@ class Trouble(Part):
     jump: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
         0.0, description="largest offset of a position fix, in σ of the sensors; any horizontal direction"
     )
+    restarts: tuple[Few, Few] = Field(
+        (0, 0), description="how many companions end, each for for_s until another one begins in its place"
+    )
     within_s: Seconds = Field(
         8.0, description="latest start of a fault after the goal event; longest pause before a partition"
     )
@@ -116,6 +119,12 @@ def strike(trouble: Trouble, count: int, random: np.random.Generator) -> dict[st
         begins += lasts
     document["partitions"] = partitions
     _strike_estimates(trouble, document, order, random)
+    if trouble.restarts[1]:
+        # Drawn last, as those.
+        left = order[freezes + vanishes :]
+        for system in left[: many(trouble.restarts, len(left))]:
+            at_s, for_s = drawn((0.1, trouble.within_s)), drawn(trouble.for_s)
+            faults.append({"kind": "restart", "vehicle": system, "at_s": at_s, "for_s": for_s})
     return document
 
 

@@ -47,7 +47,7 @@ def fly(seed: int, kind: Kind) -> Swarm:
         rough = rough._replace(mute=tuple((restarts - 500_000, restarts + 500_000, whom) for whom in (2, 3)))
     elif kind == "quick":
         restarts = int(rng.integers(800_000, 2_000_000))
-        habits[0] = Habits(frozen=((restarts - int(rng.integers(1, 100_000)), restarts),), restarts=restarts)
+        habits[0] = Habits(frozen=((restarts - int(rng.integers(1, 30_000)), restarts),), restarts=restarts)
         places[0] = _FAR
 
     def destination(since: int, system: int) -> Array:

@@ -103,13 +103,17 @@ def test_what_binds_determines_the_minimiser(seed: int) -> None:
     assert found.size >= 0
     k = found.size
     multipliers, planes = found.multipliers(k), 6 * (5 * len(qp.one) - 1)
-    x, push = np.empty_like(qp.c), np.empty(3)
-    rest = DT, *qp[3:], planes
-    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, push)
+    x, forces = np.empty_like(qp.c), np.empty((3, 3))
+    whose = np.arange(planes) % 3
+    rest = DT, *qp[3:], whose
+    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, forces)
     assert violation < 1e-7
     np.testing.assert_allclose(x, minimiser(qp), rtol=0.0, atol=1e-5)
     first = found.active[:k] < planes
-    np.testing.assert_allclose(push, multipliers[first] @ qp.normals[found.active[:k][first]], atol=1e-9)
+    binding = found.active[:k][first]
+    pushes = multipliers[first, None] * qp.normals[binding]
+    for m in range(3):
+        np.testing.assert_allclose(forces[m], pushes[binding % 3 == m].sum(axis=0), atol=1e-9)
 
 
 @given(seeds)
@@ -121,12 +125,13 @@ def test_another_set_is_not_taken_for_it(seed: int) -> None:
         return
     k = found.size - 1
     multipliers, planes = found.multipliers(k), 6 * (5 * len(qp.one) - 1)
-    x, push = np.empty_like(qp.c), np.empty(3)
-    rest = DT, *qp[3:], planes
-    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, push)
+    x, forces = np.empty_like(qp.c), np.empty((3, 3))
+    whose = np.arange(planes) % 3
+    rest = DT, *qp[3:], whose
+    violation = combine(qp.start, found.images, multipliers, found.active, *rest, x, forces)
     assert violation > 1e-9 or np.abs(x - minimiser(qp)).max() < 1e-5
     negative = np.concatenate([multipliers, [-1.0]])
-    assert combine(qp.start, found.images, negative, found.active, *rest, x, push) == np.inf
+    assert combine(qp.start, found.images, negative, found.active, *rest, x, forces) == np.inf
 
 
 @pytest.mark.parametrize("value", [np.nan, 3.0])

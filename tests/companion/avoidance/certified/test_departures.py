@@ -15,6 +15,7 @@ from tests.companion.avoidance.certified.two import (
     OTHER,
     OWN,
     THIRD,
+    Two,
     agreed,
     agreements,
     epoch,
@@ -157,6 +158,29 @@ def test_a_farewell_counts_only_if_its_sender_has_considered_a_plan_since_the_ow
     farewell = statement(4, Entry(THIRD, considered=(epoch(4), epoch(9))), Entry(OWN, (), considered))
     one.receive_statement(epoch(4), OTHER, farewell._replace(farewell=True))
     assert (OTHER in one.left) == answers
+
+
+def test_who_ends_before_there_is_an_agreement_is_not_waited_for() -> None:
+    """Its backup node says farewell with the last entries that it stated."""
+    two = Two()
+    two.make(OWN, plan())
+    two.make(OTHER, plan(1, x=4.0))
+    # The second does not lead, and nothing was proposed to it, because the first has received nothing of it.
+    two.tell(OWN, NOW)
+    entries = tuple(entry._replace(agreements=()) for entry in two.second.entries(every=True))
+    now = NOW + LENGTH
+    two.first.receive_plan(now, OTHER, pack(plan(1, x=4.0)))
+    two.first.receive_statement(now, OTHER, Statement(FRAME, epoch(1), EPOCH, entries, farewell=True))
+    assert two.first.left.keys() == {OTHER}
+    # What was received bars no agreement.
+    alive = Two()
+    alive.make(OWN, plan())
+    alive.make(OTHER, plan(1, x=4.0))
+    alive.tell(OWN, NOW)
+    alive.make(OWN, plan(1))
+    for system in (OTHER, OWN, OTHER, OWN):
+        alive.tell(system, now)
+    assert not alive.first.missing() | alive.second.missing()
 
 
 def test_a_farewell_answers_the_newest_plan_that_was_received() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.avoidance.certified.commitment import Commitment
-from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
 from companion.avoidance.certified.detour import Subgoal
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.config.certified import CertifiedConfig
@@ -18,6 +18,7 @@ from tests.companion.avoidance.certified.test_commitment import NOBODY
 CONFIG = CertifiedConfig(dt_us=DT, epoch_us=DT)
 LIMITS = LimitsConfig(u_max=(3.0, 3.0, 3.0), v_max=(7.0, 7.0, 7.0), box_max=(900.0, 900.0, 50.0))
 HERE = np.array([0.0, 0.0, 5.0])
+BACK = Pushes(np.array([[-1e3, 0.0, 0.0]]), np.zeros((1, 3)))
 
 
 def lag(velocity: Array, seconds: float, *, moving: bool = True) -> float:
@@ -51,7 +52,7 @@ def turned(seconds: float, *, moving: bool) -> float:
     """How far (rad) the goal is turned after a push straight back for so long."""
     turn = DeadlockTurn(CONFIG.deadlock)
     for _ in range(round(5 * seconds)):
-        turn.learn(HERE, HERE + np.array([4.0, 0, 0]), np.array([-1e3, 0, 0]), 1.0, 0.2, moving=moving)
+        turn.learn(HERE, HERE + np.array([4.0, 0, 0]), BACK, 1.0, 0.2, moving=moving)
     return turn.angle
 
 

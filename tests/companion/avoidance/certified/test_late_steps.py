@@ -13,8 +13,8 @@ from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm, Vehicle
 
 LENGTH, UNTIL = 200_000, 8_000_000
-LATE = tuple((k * LENGTH + 90_000, (k + 1) * LENGTH + 110_000) for k in range(1, UNTIL // LENGTH, 2))
-"""Not called from the time at which plans wait for agreements until the same time of the next epoch."""
+LATE = tuple((k * LENGTH + 120_000, (k + 1) * LENGTH + 180_000) for k in range(1, UNTIL // LENGTH, 2))
+"""Not called from before the time at which a plan is made until the last call of the next epoch."""
 
 
 class Recorded(Swarm):

@@ -61,6 +61,7 @@ class Rows(NamedTuple):
     of: NDArray[np.int64]
     c: Array
     low: Array
+    whose: NDArray[np.int64]
     x_min: Array
     x_max: Array
 
@@ -79,9 +80,10 @@ def written(drawn: Drawn) -> Rows:
     n = len(drawn.committed)
     most, bounds = 24 * n + drawn.wanted.size, np.empty((2, 3, n))
     rows = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
-    planes, count = rows_within(*drawn[:3], DT, *drawn[3:], bounds[0], bounds[1], *rows)
+    whose = np.empty(drawn.wanted.size, np.int64)
+    planes, count = rows_within(*drawn[:3], DT, *drawn[3:], bounds[0], bounds[1], *rows, whose)
     of, c, low = (part[:count] for part in rows)
-    return Rows(planes, of, c, low, *bounds)
+    return Rows(planes, of, c, low, whose[:planes], *bounds)
 
 
 @draws
@@ -100,9 +102,9 @@ def test_slacks_are_those_of_the_motion_and_of_the_matrix(seed: int, n: int, cou
     every = drawn.slack(a)
     for one in slack:
         assert np.abs(every - one).min() < 1e-9
-    of_planes = every[: drawn.wanted.size]
-    for one in slack[: rows.planes]:
-        assert np.abs(of_planes - one).min() < 1e-9
+    of_planes = every[: drawn.wanted.size].reshape(drawn.wanted.shape)
+    for one, m in zip(slack[: rows.planes], rows.whose, strict=True):
+        assert np.abs(of_planes[m] - one).min() < 1e-9
 
 
 @draws
