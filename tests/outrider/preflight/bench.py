@@ -13,7 +13,8 @@ from mavlink_bridge.network.channel import Channel, Direction, Faults
 from mavlink_bridge.network.simulated import SimulatedNetwork
 from mavlink_bridge.node import Node
 from outrider.preflight.findings import Check, Result, Verdict
-from outrider.preflight.node import FlightTerms, Preflight, Terms
+from outrider.preflight.node import Preflight
+from outrider.preflight.terms import FlightTerms, Terms
 from outrider.preflight.tube import TrackingError
 from outrider.scenarios.fly_config import FleetOrigin
 from sitl.node import LINK, Autopilot

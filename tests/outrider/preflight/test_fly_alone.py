@@ -16,7 +16,7 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from outrider.preflight.course import Box
 from outrider.preflight.findings import Result
-from outrider.preflight.node import FlightTerms, Phase
+from outrider.preflight.terms import FlightTerms, Phase
 from sitl.node import LINK
 from tests.outrider.preflight.bench import SECOND, Fleet, companion, failed, found
 

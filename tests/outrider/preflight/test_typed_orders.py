@@ -12,7 +12,8 @@ from outrider.errors import OutriderError
 from outrider.fly.line_input import LineInput
 from outrider.interruption import ReceivedSignal
 from outrider.preflight.course import Box
-from outrider.preflight.node import FlightTerms, Preflight, Terms
+from outrider.preflight.node import Preflight
+from outrider.preflight.terms import FlightTerms, Terms
 from outrider.preflight.typed_orders import TypedOrders
 from tests.outrider.preflight.bench import ORIGIN, companion
 

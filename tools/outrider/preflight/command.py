@@ -33,8 +33,9 @@ from outrider.interruption import insisted, noted
 from outrider.key_files import key_of
 from outrider.preflight.course import Box, box_of
 from outrider.preflight.findings import Verdict
-from outrider.preflight.node import FlightTerms, Preflight, Terms
+from outrider.preflight.node import Preflight
 from outrider.preflight.page import document, show
+from outrider.preflight.terms import FlightTerms, Terms
 from outrider.preflight.tube import tracking_error
 from outrider.preflight.typed_orders import STOPS, TypedOrders
 from outrider.resources import find

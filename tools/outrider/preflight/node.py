@@ -8,15 +8,12 @@ alone, in its turn (``turns``). No socket and no clock.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import Enum
 from math import ceil
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.fingerprint import fingerprint
-from companion.config import CompanionConfig
 from companion.values.components import COMPONENT
 from mavlink_bridge.clocks.system_clock import SystemClock
 from mavlink_bridge.errors import PlanWireError
@@ -29,17 +26,15 @@ from mavlink_bridge.wire.signing import Signing
 from outrider.errors import OutriderError
 from outrider.preflight.autopilot import RECEIVED, AutopilotFigures
 from outrider.preflight.clock_meter import ClockMeter
-from outrider.preflight.course import Box
 from outrider.preflight.exchange import Exchange, in_parts, whole
 from outrider.preflight.findings import Check, Result, Verdict
 from outrider.preflight.judgement import judge
 from outrider.preflight.link_meter import LinkMeter
 from outrider.preflight.lone_flight import LoneFlight
 from outrider.preflight.own_checks import CLOCK, SIGMA, TUBE, own_checks
-from outrider.preflight.tube import TrackingError
+from outrider.preflight.terms import Phase, Terms
 from outrider.preflight.turns import PERIOD_US, Turns
 from outrider.scenarios.fleet_file import stated_at
-from outrider.scenarios.fly_config import FleetOrigin
 
 _REPORT_US: Final = 200_000
 """Time between two transmissions of the own report, µs."""
@@ -52,55 +47,6 @@ _CLOCK_PATIENCE_US: Final = 20_000_000
 _NS_PER_US: Final = 1000
 _MOST_RUNS: Final = 1_000
 _SWARM_IDS: Final = (mavlink.MAVLINK_MSG_ID_TUNNEL, mavlink.MAVLINK_MSG_ID_TIMESYNC)
-
-
-class Phase(Enum):
-    """Phase of the check."""
-
-    WAIT = "waiting"
-    MEASURE = "measuring"
-    TURNS = "flying alone"
-    EXCHANGE = "exchanging reports"
-    OVER = "done"
-
-
-@dataclass(frozen=True)
-class FlightTerms:
-    """Terms of the flight alone.
-
-    ``target``: system id of the target, which is not used; ``height`` (m): of the take-off; ``go``: whether
-    the operator's go was given before; ``dry``: nothing flies.
-    """
-
-    target: int
-    height: float
-    box: Box
-    go: bool = False
-    dry: bool = False
-
-
-@dataclass(frozen=True)
-class Terms:
-    """Terms of a check: ``config`` has the roster as ``certified.fleet``.
-
-    ``seconds``: duration of the measurement; ``wait_s``: longest time to wait for the others. ``run``: random
-    number (32 bits) of this process. ``flown``: tracking error of the vehicle in a recorded flight. ``fly``:
-    terms of the flight alone; None: nothing flies.
-    """
-
-    system: int
-    config: CompanionConfig
-    origin: FleetOrigin
-    seconds: float
-    wait_s: float
-    run: int
-    flown: TrackingError | None = None
-    fly: FlightTerms | None = None
-
-    @property
-    def others(self) -> tuple[int, ...]:
-        """System ids of the others, sorted."""
-        return tuple(sorted(set(self.config.certified.fleet) - {self.system}))
 
 
 class Preflight:
