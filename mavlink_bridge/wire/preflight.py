@@ -1,17 +1,19 @@
 """Messages between the checks before a certified flight, each in a TUNNEL.
 
 A *probe* has the size of a committed plan, so that a link is measured with messages as in flight. A *report*
-has what one vehicle has measured, in one or more parts.
+has what one vehicle has measured, in one or more parts. A *turn* says how far a vehicle is that flies alone.
 
 Sizes in bytes, little endian. Both: kind 1, run 4 (a random number of the sending process), fingerprint of
 the fleet's common settings 4. Probe: sequence number 4, time 7 (µs, the sender's clock), 0xFF up to 128.
 Report: flags 1 (bit 0: passed; bits 1, 2, 3: σ, clock, tube are known; bits 4, 5, 6: the file states them),
 part 1, number of parts 1, autopilot 1 (MAV_AUTOPILOT), UTC 4 (s), σ 2 (mm), clock 4 (µs), tube 2 (mm), then
 the links: peer 1, loss 2 (1/10 000), jitter 2 (0.1 ms), round trip 2 (0.1 ms; 65 535: unknown).
+Turn: kind 3, run 4, fingerprint 4, stage 1, 1 if the vehicle is disarmed.
 """
 
 from __future__ import annotations
 
+from enum import Enum
 from struct import Struct
 from struct import error as StructError  # noqa: N812
 from typing import NamedTuple
@@ -20,11 +22,12 @@ from mavlink_bridge.errors import PlanWireError
 
 PAYLOAD_TYPE = 0xDC06
 """TUNNEL.payload_type; values above 32767 are free for private use."""
-PROBE, REPORT = 1, 2
+PROBE, REPORT, TURN = 1, 2, 3
 _SIZE = 128
 _PROBE = Struct("<BIII7s")
 _REPORT = Struct("<BIIBBBBIHIH")
 _LINK = Struct("<BHHH")
+_TURN = Struct("<BIIBB")
 LINKS_PER_PART = (_SIZE - _REPORT.size) // _LINK.size
 """Largest number of links in one part of a report."""
 _KNOWN, _STATED = 1, 4
@@ -55,6 +58,27 @@ class LinkReport(NamedTuple):
     round_trip: int | None
 
 
+class Stage(Enum):
+    """Stage of a vehicle in the flights alone."""
+
+    CHECKS = 0
+    """On-ground checks are not over."""
+    READY = 1
+    FLIES = 2
+    LANDED = 3
+    ENDED = 4
+    """It does not fly, or not any more, and its tube was not measured."""
+
+
+class Turn(NamedTuple):
+    """Stage of the vehicle of the process ``run``; ``disarmed``: a heartbeat of the last seconds says so."""
+
+    run: int
+    fingerprint: int
+    stage: Stage
+    disarmed: bool
+
+
 class Report(NamedTuple):
     """What the process ``run`` has measured; this is ``part`` (0…) of ``parts``.
 
@@ -75,9 +99,11 @@ class Report(NamedTuple):
     links: tuple[LinkReport, ...]
 
 
-def pack(message: Probe | Report) -> bytes:
+def pack(message: Probe | Report | Turn) -> bytes:
     """Encode ``message``; raise PlanWireError for a value that does not fit."""
     try:
+        if isinstance(message, Turn):
+            return _TURN.pack(TURN, message.run, message.fingerprint, message.stage.value, message.disarmed)
         return _packed_probe(message) if isinstance(message, Probe) else _packed_report(message)
     except (OverflowError, StructError):
         raise PlanWireError(f"out of range of the wire: {message}") from None
@@ -102,8 +128,13 @@ def _packed_report(report: Report) -> bytes:
     return data
 
 
-def unpack(data: bytes) -> Probe | Report:
-    """Decode a probe or a report; raise PlanWireError for anything that ``pack`` cannot produce."""
+def unpack(data: bytes) -> Probe | Report | Turn:
+    """Decode a message; raise PlanWireError for anything that ``pack`` cannot produce."""
+    if len(data) == _TURN.size and data[0] == TURN:
+        _, run, fingerprint, stage, disarmed = _TURN.unpack(data)
+        if stage > Stage.ENDED.value or disarmed > 1:
+            raise PlanWireError(f"a turn with stage {stage} and {disarmed} is not valid")
+        return Turn(run, fingerprint, Stage(stage), bool(disarmed))
     if len(data) == _SIZE and data[0] == PROBE and not data[_PROBE.size :].strip(b"\xff"):
         _, run, fingerprint, sequence, time = _PROBE.unpack_from(data)
         return Probe(run, fingerprint, sequence, int.from_bytes(time, "little"))

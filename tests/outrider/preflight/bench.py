@@ -11,8 +11,10 @@ from mavlink_bridge.clocks.system_clock import SystemTimeReading
 from mavlink_bridge.loops.lockstep import LockStep, Scheduled
 from mavlink_bridge.network.channel import Channel, Direction, Faults
 from mavlink_bridge.network.simulated import SimulatedNetwork
+from mavlink_bridge.node import Node
 from outrider.preflight.findings import Check, Result, Verdict
-from outrider.preflight.node import Preflight, Terms
+from outrider.preflight.node import Preflight
+from outrider.preflight.terms import FlightTerms, Terms
 from outrider.preflight.tube import TrackingError
 from outrider.scenarios.fly_config import FleetOrigin
 from sitl.node import LINK, Autopilot
@@ -43,7 +45,9 @@ SWIFT = Faults(delay=4_000)
 
 class Fleet:
     """Three vehicles, all ArduPilot but the second; ``configs``, ``origins``, ``autopilots``: what differs of
-    one, by system id. ``twins``: ids of which a second companion runs. ``faults``: of the swarm's channel."""
+    one, by system id. ``fly``: terms of the flights alone; ``others``: further
+    nodes on the cables of the autopilots.
+    ``twins``: ids of which a second companion runs. ``faults``: of the swarm's channel."""
 
     def __init__(
         self,
@@ -58,6 +62,8 @@ class Fleet:
         twins: tuple[int, ...] = (),
         system_us: int | None = None,
         flown: Mapping[int, TrackingError] | None = None,
+        fly: Mapping[int, FlightTerms] | None = None,
+        others: Mapping[int, Node] | None = None,
         wait_s: float = 20.0,
         seed: int = 1,
     ) -> None:
@@ -80,6 +86,7 @@ class Fleet:
                     wait_s,
                     run=1000 * twin + system,
                     flown=(flown or {}).get(system),
+                    fly=(fly or {}).get(system),
                 )
                 bound = system_us
                 clock = None if bound is None else _clock(bound)
@@ -90,6 +97,9 @@ class Fleet:
                 scheduled.append(Scheduled(node, PERIOD, 2 * TICK * (1 + system + twin), shown))
                 members[node.name] = "autopilot"
                 swarm[node.name] = "swarm"
+            if others and system in others:
+                scheduled.append(Scheduled(others[system], PERIOD))
+                members[others[system].name] = LINK
             channels.append(Channel(f"cable-{system}", members, Faults(delay=2_000)))
         channels.append(Channel("swarm", swarm, faults, overrides or {}))
         self.loop = LockStep(scheduled, SimulatedNetwork(channels, seed, TICK), TICK)

@@ -18,7 +18,8 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.preflight import MOST, LinkReport, Report, pack
 from outrider.preflight.findings import Result
 from outrider.preflight.judgement import judge
-from outrider.preflight.node import Preflight, Terms
+from outrider.preflight.node import Preflight
+from outrider.preflight.terms import Terms
 from outrider.preflight.tube import TrackingError
 from outrider.scenarios.fleet_file import FleetFile, text_of
 from outrider.yaml_files.yaml_file import read

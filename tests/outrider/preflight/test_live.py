@@ -31,7 +31,9 @@ def own_file(folder: Path, **changes: object) -> Path:
     return path
 
 
-def check(folder: Path, base: int, systems: tuple[int, ...], group: str) -> list[tuple[int, str, str]]:
+def check(
+    folder: Path, base: int, systems: tuple[int, ...], group: str, *options: str
+) -> list[tuple[int, str, str]]:
     """Status and output of the check of each vehicle, at once."""
     running = [
         subprocess.Popen(
@@ -40,6 +42,7 @@ def check(folder: Path, base: int, systems: tuple[int, ...], group: str) -> list
                 *(f"--autopilot=tcp:127.0.0.1:{base + 10 * k}", f"--swarm=mcast:{group},127.0.0.1"),
                 *(f"--system={system}", "--roster=1,2", "--seconds=5", "--wait=60"),
                 f"--out={folder / f'fleet-{system}-{k}.yaml'}",
+                *options,
             ],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -83,3 +86,16 @@ def test_two_processes_with_one_id_both_fail(tmp_path: Path) -> None:
         failed = [one for one in json.loads(out)["checks"] if one["result"] == "fail"]
         assert "another companion has this id" in [one["text"] for one in failed]
     assert not list(tmp_path.glob("fleet-*"))
+
+
+def test_a_dry_run_shows_what_it_would_write_and_writes_and_flies_nothing(tmp_path: Path) -> None:
+    own_file(tmp_path)
+    base = free_base("ardupilot", 2)
+    with sitl("--count=2", f"--port-base={base}"):
+        ended = check(tmp_path, base, (1, 2), group(), "--dry-run", "--fly")
+    for status, out, err in ended:
+        assert status == 0, out + err
+        found = json.loads(out)
+        assert (found["ready"], found["file"], found["fleet"]["roster"]) == (True, None, [1, 2])
+        assert "a dry run does not fly" in [one["text"] for one in found["checks"]]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["own.yaml"]

@@ -9,6 +9,7 @@ import pytest
 
 from outrider.errors import InputError
 from outrider.preflight.command import Options, checked, preflight
+from outrider.preflight.course import Box
 from outrider.resources import find
 
 ASKED = Options("udpin:127.0.0.1:14550", "mcast:,127.0.0.1", "px4", system=1, roster="1,2")
@@ -33,6 +34,15 @@ def test_a_file_and_a_roster_suffice() -> None:
         ({"autopilot": "udp:1"}, "--autopilot"),
         ({"swarm": "tlog:flight.tlog"}, "a log answers nothing"),
         ({"config": "px5"}, "did you mean 'px4'"),
+        ({"go": True}, "allowed with it: --fly"),
+        ({"box": "8,8,3"}, "allowed with it: --fly"),
+        ({"fly": True, "flight": Path("flight.tlog")}, "--flight"),
+        ({"fly": True, "go": True, "dry_run": True}, "nothing takes off"),
+        ({"fly": True, "box": "8,8"}, "EAST,NORTH,UP"),
+        ({"fly": True, "box": "8,8,nan"}, "EAST,NORTH,UP"),
+        ({"fly": True, "box": "3,8,3"}, "4 to 60"),
+        ({"fly": True, "box": "8,-61,3"}, "4 to 60"),
+        ({"fly": True, "box": "8,8,-3"}, "1 to 20 up"),
     ],
 )
 def test_bad_input_names_what_is_allowed(changes: dict[str, object], words: str) -> None:
@@ -53,3 +63,24 @@ def test_a_file_that_could_not_be_written_is_refused_before_anything_is_measured
     for out in (tmp_path, tmp_path / "nowhere" / "fleet.yaml"):
         with pytest.raises(InputError, match="--out"):
             preflight(replace(ASKED, out=out))
+
+
+@pytest.mark.parametrize(("line", "words"), [("radio: 57600", "radio: null"), ("clock: autopilot", "wall")])
+def test_a_file_with_which_committed_plans_cannot_be_flown_is_refused(
+    line: str, words: str, tmp_path: Path
+) -> None:
+    own = tmp_path / "own.yaml"
+    own.write_text(f"{line}\n" + find("companions", "px4").read_text(encoding="utf-8"))
+    checked(replace(ASKED, config=str(own)))
+    with pytest.raises(InputError, match=words):
+        checked(replace(ASKED, config=str(own), fly=True))
+
+
+def test_the_course_has_a_size_and_the_height_of_the_file() -> None:
+    fly = checked(replace(ASKED, fly=True)).terms.fly
+    assert fly is not None
+    assert (fly.box, fly.height, fly.go, fly.dry) == (Box(8.0, 8.0, 3.0), 5.0, False, False)
+    fly = checked(replace(ASKED, fly=True, box="-6,10,2", dry_run=True)).terms.fly
+    assert fly is not None
+    assert (fly.box, fly.dry) == (Box(-6.0, 10.0, 2.0), True)
+    assert checked(ASKED).terms.fly is None

@@ -229,17 +229,47 @@ def preflight(
         "fleet.yaml"
     ),
     as_json: AsJson = False,
+    fly: Annotated[
+        bool, typer.Option("--fly", help="Fly a small course alone, after a go, which measures the tube.")
+    ] = False,
+    go: Annotated[
+        bool, typer.Option("--go", help="The operator's go, given as soon as it is its turn: it takes off.")
+    ] = False,
+    box: Annotated[
+        str | None, typer.Option(help="Course of --fly: EAST,NORTH,UP in m from above the start (8,8,3).")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check, and show what would be written; fly and write nothing.")
+    ] = False,
 ) -> None:
     """Check a fleet before a certified flight, by one process on each companion, and write the fleet file.
 
-    It measures links, clocks and the accuracy of positions, and reads parameters; it arms and moves nothing.
-    Exits with 1 if a check fails (docs/preflight.md).
+    It measures links, clocks and the accuracy of positions, and reads parameters; without --fly it arms and
+    moves nothing. Exits with 1 if a check fails (docs/preflight.md).
     """
+    from outrider.terminal.compilation import say_if_compiling
+
+    if fly:
+        say_if_compiling()
     from outrider.preflight.command import Options
     from outrider.preflight.command import preflight as checking
 
     options = Options(
-        autopilot, swarm, config, system, roster, seconds, wait, signing_key, flight, out, as_json
+        autopilot,
+        swarm,
+        config,
+        system,
+        roster,
+        seconds,
+        wait,
+        signing_key,
+        flight,
+        out,
+        as_json,
+        fly,
+        go,
+        box,
+        dry_run,
     )
     raise typer.Exit(checking(options))
 

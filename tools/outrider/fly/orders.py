@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.telemetry.reception import LINKS
 from companion.values.components import COMPONENT
-from mavlink_bridge.messages import CommandLong, Source
+from mavlink_bridge.messages import CommandLong, Message, Source
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 
@@ -37,7 +37,11 @@ class Orders:
         """Return the frame for ``word``, one of ``WORDS`` except ``quit``."""
         params = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, self._height if word == "go" else 0.0)
         source = Source(self._system, OPERATOR)
-        return self._codec.encode(CommandLong(source, self._system, COMPONENT, _COMMANDS[word], 0, params))
+        return self.encode(CommandLong(source, self._system, COMPONENT, _COMMANDS[word], 0, params))
+
+    def encode(self, message: Message) -> bytes:
+        """Return the frame of another order."""
+        return self._codec.encode(message)
 
 
 def answered(command: int, result: int, phase: str, waiting: str) -> str:

@@ -69,6 +69,7 @@ class AutopilotFigures:
         self._received: dict[type[Message], int] = {}
         self._since: int | None = None
         self._heard: int | None = None
+        self._armed = False
         self._next_beat = self._next_request = 0
 
     def receive(self, now: int, message: Message) -> None:
@@ -77,6 +78,7 @@ class AutopilotFigures:
         match message:
             case Heartbeat():
                 self._heard, self.profile = now, profile_of(message)
+                self._armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
                 self._since = now if self._since is None else self._since
             case ParamValue() if message.name in self._names() and self.profile is not None:
                 value = number_of(message, bytewise=self.profile.bytewise)
@@ -112,6 +114,10 @@ class AutopilotFigures:
             return "an autopilot that is known (ArduPilot, PX4)"
         late = self._since is not None and now - self._since > _PATIENCE_US
         return "" if late or not self.unread else "the autopilot's parameters"
+
+    def disarmed(self, now: int) -> bool:
+        """Return whether a heartbeat of the last seconds before ``now`` (µs) says that it is disarmed."""
+        return self._heard is not None and now - self._heard <= _LOST_US and not self._armed
 
     @property
     def unread(self) -> tuple[str, ...]:

@@ -6,30 +6,43 @@ import json
 import os
 import secrets
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from companion.config import CompanionConfig
+from companion.flight.hold_on_exit import HoldOnExit
 from mavlink_bridge.clocks.clock import Clock, WallClock
 from mavlink_bridge.clocks.system_clock import KernelClock
 from mavlink_bridge.errors import EndpointError, LinkError
 from mavlink_bridge.links.endpoints import Endpoint, Replay, parse_endpoint
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
+from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
 from outrider.errors import InputError
+from outrider.fly.hold_on_exit import farewell
 from outrider.fly.instance_lock import instance_lock
+from outrider.fly.line_input import typing
+from outrider.fly.log import Log
+from outrider.fly.read_only_link import ReadOnlyLink
+from outrider.interruption import insisted, noted
 from outrider.key_files import key_of
+from outrider.preflight.course import Box, box_of
 from outrider.preflight.findings import Verdict
-from outrider.preflight.node import Preflight, Terms
+from outrider.preflight.node import Preflight
 from outrider.preflight.page import document, show
+from outrider.preflight.terms import FlightTerms, Terms
 from outrider.preflight.tube import tracking_error
+from outrider.preflight.typed_orders import STOPS, TypedOrders
 from outrider.resources import find
+from outrider.runs import names
 from outrider.scenarios.fleet_file import text_of, with_fleet_file
 from outrider.scenarios.fly_config import FlyConfig
+from outrider.terminal.lines import say
 from outrider.terminal.share_progress import share_progress
 from outrider.yaml_files.yaml_file import load
 
@@ -52,6 +65,10 @@ class Options:
     flight: Path | None = None
     out: Path = Path("fleet.yaml")
     as_json: bool = False
+    fly: bool = False
+    go: bool = False
+    box: str | None = None
+    dry_run: bool = False
 
 
 @dataclass(frozen=True)
@@ -102,8 +119,32 @@ def checked(options: Options) -> Request:
         flown = tracking_error(
             options.flight, config.system, planar=companion.planar, lead=companion.setpoint_lead_us
         )
-    terms = Terms(config.system, companion, config.origin, options.seconds, options.wait, run, flown)
+    fly = _flight(options, config, companion)
+    terms = Terms(config.system, companion, config.origin, options.seconds, options.wait, run, flown, fly)
     return Request(terms, endpoints, config.period_us)
+
+
+def _flight(options: Options, config: FlyConfig, companion: CompanionConfig) -> FlightTerms | None:
+    """Return the terms of the flight alone; None without ``--fly``. Raises InputError."""
+    if not options.fly:
+        for name in ("go", "box"):
+            if getattr(options, name):
+                raise InputError(f"--{name}: is of a flight; allowed with it: --fly")
+        return None
+    if options.flight is not None:
+        raise InputError("--flight: does not go with --fly, which measures the tube by a flight of its own")
+    if options.go and options.dry_run:
+        raise InputError("--go: does not go with --dry-run, in which nothing takes off")
+    if config.radio is not None:
+        raise InputError(f"--fly: committed plans do not fit radio {config.radio}; needed: radio: null")
+    if config.clock == "autopilot":
+        raise InputError(
+            "--fly: clock 'autopilot' follows the autopilot's, and committed plans need a clock that runs"
+            " evenly; allowed: wall, auto"
+        )
+    box = box_of(options.box or ",".join(f"{edge:g}" for edge in Box()), planar=companion.planar)
+    height = config.takeoff_height
+    return FlightTerms(config.target, height, box, go=options.go, dry=options.dry_run)
 
 
 def _with_roster(companion: CompanionConfig, roster: tuple[int, ...]) -> CompanionConfig:
@@ -139,9 +180,10 @@ def preflight(options: Options) -> int:
     folder = options.out.parent
     if options.out.is_dir() or not folder.is_dir():
         raise InputError(f"--out {options.out}: needed: a file in a folder that exists")
-    signing = None if options.signing_key is None else Signing(key_of(options.signing_key))
+    key = None if options.signing_key is None else key_of(options.signing_key)
+    signing, in_flight = (None, None) if key is None else (Signing(key), Signing(key))
     clock = WallClock()
-    node = Preflight(request.terms, signing, KernelClock(clock.offset_ns))
+    node = Preflight(request.terms, signing, KernelClock(clock.offset_ns), in_flight)
     with instance_lock(request.terms.system, request.endpoints["autopilot"]), ExitStack() as opened:
         links: dict[Endpoint, Link] = {}
         try:
@@ -150,23 +192,72 @@ def preflight(options: Options) -> int:
         except LinkError as error:
             raise InputError(f"preflight {error}") from None
         ends = {name: links[endpoint] for name, endpoint in request.endpoints.items()}
-        verdict = run(node, ends, clock, request.period)
-    written = _written(options.out, verdict)
+        if options.dry_run and ends["autopilot"] is not ends["swarm"]:
+            ends["autopilot"] = ReadOnlyLink(ends["autopilot"])
+        flies = request.terms.fly is not None and not request.terms.fly.dry
+        if flies:
+            verdict = flown(node, ends, clock, request.period, folder, in_flight)
+        else:
+            verdict = run(node, ends, clock, request.period)
+    written = None if options.dry_run else _written(options.out, verdict)
     if options.as_json:
         sys.stdout.write(json.dumps(document(verdict, written)) + "\n")
     else:
-        show(verdict, written)
+        show(verdict, written, dry=options.dry_run)
     return READY if verdict.passed else NOT_READY
 
 
-def run(node: Preflight, links: dict[str, Link], clock: Clock, period: int) -> Verdict:
+def flown(
+    node: Preflight,
+    links: dict[str, Link],
+    clock: Clock,
+    period: int,
+    folder: Path,
+    signing: Signing | None,
+) -> Verdict:
+    """Run ``node``, which may fly, with the operator's orders and the signals; return the verdict.
+
+    What passes on the links is logged in ``folder``. If the process ends while it controls the vehicle, by a
+    signal, the order ``quit`` or an exception, the autopilot is requested to hold. ``signing``: that of the
+    flight.
+    """
+    system = node.system
+    with (
+        noted(STOPS) as stops,
+        typing(False) as typed,
+        Log(folder / f"preflight-{system}", system, lambda why: say(f"preflight: {why}")) as log,
+    ):
+        orders = TypedOrders(node, typed, stops, say)
+        try:
+            return run(node, links, clock, period, orders.look, log)
+        finally:
+            flight = node.flight
+            if flight is not None and flight.controls:
+                word = HoldOnExit(system, flight.heartbeat, signing)
+                farewell(word, links["autopilot"], clock, lambda: insisted(stops))
+                say(f"the vehicle: {word.said or 'asked to hold, no answer yet'}")
+                if word.failed:
+                    say("the vehicle is armed and nothing controls it: take it over")
+
+
+def run(
+    node: Preflight,
+    links: dict[str, Link],
+    clock: Clock,
+    period: int,
+    look: Callable[[int], None] = lambda _: None,
+    tap: Callable[[int, str, Direction, Datagram], None] | None = None,
+) -> Verdict:
     """Step ``node`` every ``period`` (µs) over its ``links`` until it is over; return the verdict.
 
-    Several of the names may have the same link.
+    Several of the names may have the same link. ``look`` is called before each step, with its time (µs);
+    ``tap`` observes what is received and sent.
     """
     with share_progress() as watch:
         now = clock.now()
         while not node.over:
+            at = clock.now()
+            look(at)
             inbox = [
                 Datagram(name, data)
                 for link in {id(link): link for link in links.values()}.values()
@@ -174,8 +265,14 @@ def run(node: Preflight, links: dict[str, Link], clock: Clock, period: int) -> V
                 for name, own in links.items()
                 if own is link
             ]
-            for datagram in node.step(clock.now(), inbox):
+            leaving = node.step(at, inbox)
+            for datagram in leaving:
                 links[datagram.link].send(datagram.data)
+            if tap is not None:
+                for one in inbox:
+                    tap(at, names.companion(node.system), "in", one)
+                for one in leaving:
+                    tap(at, names.companion(node.system), "out", one)
             watch(node.doing, node.share)
             now = max(now + period, clock.now())
             clock.wait_until(now)

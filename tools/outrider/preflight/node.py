@@ -1,21 +1,19 @@
 """Node of the check beside one vehicle: it waits for all, measures, and exchanges reports.
 
-It commands nothing: it requests messages and parameters of the autopilot, and sends probes, reports and
-TIMESYNC to the other companions. No socket and no clock.
+It requests messages and parameters of the autopilot, and sends probes, reports and TIMESYNC to the other
+companions. It commands nothing, except with ``FlightTerms`` and the operator's go: then the vehicle flies
+alone, in its turn (``turns``). No socket and no clock.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import Enum
 from math import ceil
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.fingerprint import fingerprint
-from companion.config import CompanionConfig
 from companion.values.components import COMPONENT
 from mavlink_bridge.clocks.system_clock import SystemClock
 from mavlink_bridge.errors import PlanWireError
@@ -23,18 +21,20 @@ from mavlink_bridge.messages import Message, Source, SystemTime, Timesync, Tunne
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.fleet_time import PAYLOAD_TYPE as FLEET_TIME
-from mavlink_bridge.wire.preflight import PAYLOAD_TYPE, Probe, Report, pack, unpack
+from mavlink_bridge.wire.preflight import PAYLOAD_TYPE, Probe, Report, Turn, pack, unpack
 from mavlink_bridge.wire.signing import Signing
+from outrider.errors import OutriderError
 from outrider.preflight.autopilot import RECEIVED, AutopilotFigures
 from outrider.preflight.clock_meter import ClockMeter
 from outrider.preflight.exchange import Exchange, in_parts, whole
 from outrider.preflight.findings import Check, Result, Verdict
 from outrider.preflight.judgement import judge
 from outrider.preflight.link_meter import LinkMeter
+from outrider.preflight.lone_flight import LoneFlight
 from outrider.preflight.own_checks import CLOCK, SIGMA, TUBE, own_checks
-from outrider.preflight.tube import TrackingError
+from outrider.preflight.terms import Phase, Terms
+from outrider.preflight.turns import PERIOD_US, Turns
 from outrider.scenarios.fleet_file import stated_at
-from outrider.scenarios.fly_config import FleetOrigin
 
 _REPORT_US: Final = 200_000
 """Time between two transmissions of the own report, µs."""
@@ -49,46 +49,20 @@ _MOST_RUNS: Final = 1_000
 _SWARM_IDS: Final = (mavlink.MAVLINK_MSG_ID_TUNNEL, mavlink.MAVLINK_MSG_ID_TIMESYNC)
 
 
-class Phase(Enum):
-    """Phase of the check."""
-
-    WAIT = "waiting"
-    MEASURE = "measuring"
-    EXCHANGE = "exchanging reports"
-    OVER = "done"
-
-
-@dataclass(frozen=True)
-class Terms:
-    """Terms of a check: ``config`` has the roster as ``certified.fleet``.
-
-    ``seconds``: duration of the measurement; ``wait_s``: longest time to wait for the others. ``run``: random
-    number (32 bits) of this process. ``flown``: tracking error of the vehicle in a recorded flight.
-    """
-
-    system: int
-    config: CompanionConfig
-    origin: FleetOrigin
-    seconds: float
-    wait_s: float
-    run: int
-    flown: TrackingError | None = None
-
-    @property
-    def others(self) -> tuple[int, ...]:
-        """System ids of the others, sorted."""
-        return tuple(sorted(set(self.config.certified.fleet) - {self.system}))
-
-
 class Preflight:
     """The check of one vehicle, a ``Node`` with the links ``autopilot`` and ``swarm``.
 
     ``system_clock`` is a source of fleet time where it is measured. The times of ``step`` must be UTC with
-    ``signing``, and should be without: reports are dated by them.
+    ``signing``, and should be without: reports are dated by them. ``signing_in_flight``: another instance
+    with the same key.
     """
 
     def __init__(
-        self, terms: Terms, signing: Signing | None = None, system_clock: SystemClock | None = None
+        self,
+        terms: Terms,
+        signing: Signing | None = None,
+        system_clock: SystemClock | None = None,
+        signing_in_flight: Signing | None = None,
     ) -> None:
         self.name = f"preflight-{terms.system}"
         self._terms, self._signing = terms, signing
@@ -125,6 +99,19 @@ class Preflight:
         self._parts: list[Report] = []
         self._exchange = Exchange(self.meters, self._fingerprint)
         self._complete_at: int | None = None
+        self._signing_in_flight = signing_in_flight
+        self._next_turn = 0
+        self.turns: Turns | None = None
+        """Turns of the flights alone; None without ``terms.fly``."""
+        if terms.fly is not None:
+            self.turns = Turns(
+                terms.system,
+                terms.others,
+                self._fingerprint,
+                None if terms.fly.dry else self._flight,
+                round(1e6 * terms.wait_s),
+                go=terms.fly.go,
+            )
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Receive, measure, and return what is due at ``now`` (µs)."""
@@ -139,15 +126,69 @@ class Preflight:
         self.autopilot.tick(now)
         self.clock.tick(now)
         self._advance(now)
+        flown = self._fly(now, [data for link, data in inbox if link == "autopilot"])
+        # In flight the companion alone sends to the autopilot: acknowledgements name no sender.
+        quiet = self.flight is not None and not self.flight.over
         found = {
-            "autopilot": [*self.autopilot.requests(now), *self.clock.to_autopilot(now)],
+            "autopilot": [] if quiet else [*self.autopilot.requests(now), *self.clock.to_autopilot(now)],
             "swarm": [*self.clock.to_swarm(now), *self._due(now)],
         }
         return [
-            Datagram(link, self._codecs[link].encode(message))
-            for link, messages in found.items()
-            for message in messages
+            *(Datagram("autopilot", data) for data in flown),
+            *(
+                Datagram(link, self._codecs[link].encode(message))
+                for link, messages in found.items()
+                for message in messages
+            ),
         ]
+
+    @property
+    def flight(self) -> LoneFlight | None:
+        """Flight of the own vehicle; None before it begins."""
+        return None if self.turns is None else self.turns.flight
+
+    @property
+    def system(self) -> int:
+        """System id of the vehicle."""
+        return self._terms.system
+
+    def order(self, now: int, word: str) -> str:
+        """Obey the operator's ``go`` or ``land`` at ``now`` (µs); return why not, or an empty string.
+
+        A go is not stored: it counts only while the flight waits for nothing else.
+        """
+        turns = self.turns
+        if word == "land" and turns is not None and self.phase is Phase.TURNS:
+            turns.stop(now, "the operator ordered to land")
+        elif word != "go" or turns is None or not turns.asks:
+            return f"{word}: not now: {self.doing}"
+        else:
+            turns.go = True
+        return ""
+
+    def _flight(self) -> LoneFlight:
+        terms, fly, signing = self._terms, self._terms.fly, self._signing_in_flight
+        if fly is None:
+            raise OutriderError("there are no terms of a flight")
+        if signing is not None and self._signing is not None:
+            signing.resume(self._signing.newest)
+        where = terms.system, fly.target, terms.origin.frame, fly.height, fly.box
+        return LoneFlight(terms.config, *where, signing)
+
+    def _fly(self, now: int, inbox: list[bytes]) -> list[bytes]:
+        """Fly alone, if it is the own turn; return what is to be sent to the autopilot."""
+        turns = self.turns
+        if turns is None or self.phase is not Phase.TURNS:
+            return []
+        if self._doubled:
+            turns.stop(now, "another companion has this id")
+        sent = turns.step(now, inbox, disarmed=self.autopilot.disarmed(now))
+        if self._signing is not None and self._signing_in_flight is not None:
+            self._signing.resume(self._signing_in_flight.newest)
+        if turns.over(now):
+            self._begin(now, Phase.EXCHANGE)
+            self._report(now)
+        return sent
 
     def _receive(self, now: int, link: str, message: Message) -> None:
         if link == "autopilot":
@@ -174,6 +215,9 @@ class Preflight:
         if system == self._own.system:
             # A multicast link returns the own messages.
             self._doubled |= message.run != self._terms.run
+        elif isinstance(message, Turn):
+            if self.turns is not None:
+                self.turns.receive(now, system, message)
         elif system in self.meters:
             if isinstance(message, Probe):
                 self.meters[system].receive(now, message)
@@ -191,8 +235,13 @@ class Preflight:
                     meter.begin()
         elif self.phase is Phase.MEASURE:
             if passed >= 1e6 * terms.seconds:
-                self._begin(now, Phase.EXCHANGE)
                 self._report(now)
+                if self.turns is None or not self._passed or self._exchange.refused():
+                    self._end_turns()
+                    self._begin(now, Phase.EXCHANGE)
+                else:
+                    self._begin(now, Phase.TURNS)
+                    self._parts = []
         elif self.phase is Phase.EXCHANGE:
             if self._complete_at is None and not self._exchange.awaited():
                 self._complete_at = now
@@ -213,12 +262,21 @@ class Preflight:
         late = self._began is not None and now - self._began > _CLOCK_PATIENCE_US
         return "" if late or self.clock.ready(now) else "fleet time"
 
+    @property
+    def _passed(self) -> bool:
+        return all(check.result is not Result.FAIL for check in self._checks)
+
+    def _end_turns(self) -> None:
+        if self.turns is not None:
+            self.turns.end("")
+
     def _report(self, now: int) -> None:
         """Check the own vehicle, and make the report that is sent from now on."""
         terms, autopilot, clock, flown = self._terms, self.autopilot, self.clock.bound, self._terms.flown
-        self._checks = tuple(
-            own_checks(terms.system, terms.config, autopilot, clock, flown, doubled=self._doubled)
-        )
+        if self.turns is not None:
+            flown = self.turns.result
+        checks = own_checks(terms.system, terms.config, autopilot, clock, flown, doubled=self._doubled)
+        self._checks = (*checks, *self._of_flight())
         links = [meter.figure(now).report(system) for system, meter in self.meters.items()]
         figures = (
             None if autopilot.sigma is None else _millimetres(autopilot.sigma),
@@ -230,7 +288,7 @@ class Preflight:
         report = Report(
             terms.run,
             self._fingerprint,
-            all(check.result is not Result.FAIL for check in self._checks),
+            self._passed,
             (of_sigma, of_clock, of_tube),
             0,
             1,
@@ -241,6 +299,14 @@ class Preflight:
         )
         self._parts = in_parts(report, links)
 
+    def _of_flight(self) -> list[Check]:
+        """Return the check of the flight alone once it is over."""
+        turns = self.turns
+        if turns is None or not turns.trouble or self._terms.fly is None:
+            return []
+        result = Result.NOTE if self._terms.fly.dry else Result.FAIL
+        return [Check(f"vehicle {self._terms.system}", "flight", result, turns.trouble)]
+
     def _due(self, now: int) -> list[Message]:
         """Return the probe and the own report, as far as they are due."""
         found: list[Message] = []
@@ -248,12 +314,16 @@ class Preflight:
             self._next_probe = now + self._period
             found.append(self._tunnel(Probe(self._terms.run, self._fingerprint, self._sequence, now)))
             self._sequence += 1
+        if self.turns is not None and now >= self._next_turn:
+            self._next_turn = now + PERIOD_US
+            disarmed = self.autopilot.disarmed(now)
+            found.append(self._tunnel(self.turns.message(self._terms.run, disarmed=disarmed)))
         if self._parts and now >= self._next_report:
             self._next_report = now + _REPORT_US
             found += [self._tunnel(part) for part in self._parts]
         return found
 
-    def _tunnel(self, message: Probe | Report) -> Tunnel:
+    def _tunnel(self, message: Probe | Report | Turn) -> Tunnel:
         return Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(message))
 
     @property
@@ -266,6 +336,8 @@ class Preflight:
         """Description of what it does now."""
         if self.phase is Phase.WAIT:
             return f"waiting for {self._lacking(self._now) or 'nothing'}"
+        if self.phase is Phase.TURNS and self.turns is not None:
+            return self.turns.doing
         if self.phase is Phase.EXCHANGE:
             silent = ", ".join(map(str, self._exchange.awaited()))
             return f"exchanging reports{f', none of {silent}' if silent else ''}"

@@ -117,11 +117,12 @@ def _tube(subject: str, config: CompanionConfig, flown: TrackingError | None) ->
     tube = config.certified.tube
     if flown is None:
         return Check(
-            subject, "tube", Result.NOTE, f"{tube:g} m counts, not measured; --flight LOG measures it"
+            subject,
+            "tube",
+            Result.NOTE,
+            f"{tube:g} m counts, not measured; --fly or --flight LOG measures it",
         )
-    text = (
-        f"{flown.largest:.2f} m beside the set-points at most, in {flown.seconds:.0f} s of a recorded flight"
-    )
+    text = f"{flown.largest:.2f} m beside the set-points at most, in {flown.seconds:.0f} s of flight"
     needed = _EXERCISED * max(config.limits.u_max[:2])
     if flown.acceleration < needed:
         text += f" that is too gentle: {flown.acceleration:.1f} m/s²; needed: {needed:.1f} m/s² at least"

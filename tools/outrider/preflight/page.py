@@ -10,12 +10,16 @@ from rich.table import Table
 from rich.text import Text
 
 from outrider.preflight.findings import Result, Verdict
+from outrider.scenarios.fleet_file import text_of
 
 _STYLES: Final = {Result.FAIL: "bold red", Result.NOTE: "cyan", Result.PASS: "green"}
 
 
-def show(verdict: Verdict, written: Path | None) -> None:
-    """Print all checks, then whether the fleet passes; ``written``: the fleet file."""
+def show(verdict: Verdict, written: Path | None, *, dry: bool = False) -> None:
+    """Print all checks, then whether the fleet passes; ``written``: the fleet file.
+
+    In a ``dry`` run print what the file would contain.
+    """
     console = Console(highlight=False)
     table = Table.grid(padding=(0, 2))
     for subject, name, result, text in verdict.checks:
@@ -25,6 +29,9 @@ def show(verdict: Verdict, written: Path | None) -> None:
     if verdict.fleet is None:
         failed = sum(check.result is Result.FAIL for check in verdict.checks)
         line = f"NOT ready for a certified flight: {failed} checks fail; no fleet file"
+    elif dry:
+        console.print(Text(text_of(verdict.fleet)), soft_wrap=True, end="")
+        line = f"dry run: nothing written; fingerprint {verdict.fleet.fingerprint}"
     else:
         line = f"ready for a certified flight: {written}, fingerprint {verdict.fleet.fingerprint}"
     # Not wrapped: scripts search for it.

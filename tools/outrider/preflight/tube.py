@@ -1,6 +1,6 @@
-"""Tracking error of a vehicle in a recorded flight: how far it was from its set-points, at most.
+"""Tracking error of a vehicle in a flight: how far it was from its set-points, at most.
 
-A log has the set-points that a companion sent and the positions that the autopilot reported. Both are in the
+There are the set-points that a companion sent and the positions that the autopilot reported. Both are in the
 vehicle's own local frame and on one clock, that of the log. A position is compared with the set-point sent
 before it, moved on by its velocity and acceleration, while the autopilot is in the mode in which it follows
 set-points: some are sent before. The position was true some milliseconds before it was
