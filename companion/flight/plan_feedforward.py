@@ -36,7 +36,7 @@ _PERIOD_US = 20_000
 """Longest step (µs) in which δ is advanced."""
 MAX_PAUSE_US = 500_000
 """µs between two set-points; after a longer pause δ begins anew at zero."""
-_MAX_OFFSET_M = 0.5
+MAX_OFFSET_M = 0.5
 """m: largest δ on each axis; for the plans of the shipped files it is 0.3 m."""
 NOTHING: Array = np.zeros(3)
 """No addition."""
@@ -96,7 +96,7 @@ class PlanFeedforward:
         needed = (later.acceleration - here.acceleration + drag * later.velocity)[:2]
         offset, speed, total, change = self._state
         offset = offset + dt * (speed + 0.5 * dt * change)
-        offset = np.minimum(np.maximum(offset, -_MAX_OFFSET_M), _MAX_OFFSET_M)
+        offset = np.minimum(np.maximum(offset, -MAX_OFFSET_M), MAX_OFFSET_M)
         speed = speed + dt * change
         closing = speed + loop.position * offset
         total = total + dt * closing
