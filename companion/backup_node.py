@@ -30,7 +30,7 @@ from companion.errors import CompanionError
 from companion.estimation.origins import Origins
 from companion.flight.autopilots import Profile, is_guided
 from companion.flight.autopilots.known import profile_of
-from companion.flight.plan_feedforward import USUAL_DRAG, Additions, PlanFeedforward
+from companion.flight.plan_feedforward import MAX_PAUSE_US, USUAL_DRAG, Additions, PlanFeedforward
 from companion.flight.sent_compensation import SentCompensation
 from companion.flight.setpoint import setpoint
 from companion.flight.vehicle import HEARTBEAT_LOST
@@ -293,9 +293,11 @@ class BackupNode:
         if plan.origin != self._fleet.fingerprint or not rests(plan) or not self._near(now, plan):
             return
         self._plans[plan.epoch] = plan
-        # Keep the plan that is flown, and those after it.
-        flown = max((epoch for epoch in self._plans if epoch <= now), default=plan.epoch)
-        self._plans = {epoch: kept for epoch, kept in self._plans.items() if epoch >= flown}
+        # Keep the plan that was flown before the longest pause over which the feed-forward goes on, and those
+        # after it.
+        begun = [epoch for epoch in self._plans if epoch <= now - MAX_PAUSE_US]
+        oldest = max(begun, default=min(self._plans))
+        self._plans = {epoch: kept for epoch, kept in self._plans.items() if epoch >= oldest}
 
     def _horizon(self, now: int) -> Horizon | None:
         """Return the committed plan at ``now`` (µs): the newest that has begun; None without one."""

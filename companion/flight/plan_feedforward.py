@@ -34,9 +34,9 @@ USUAL_DRAG = 0.25
 """1/s: drag per speed of a multirotor before it is estimated; most have 0.15 to 0.4."""
 _PERIOD_US = 20_000
 """Longest step (µs) in which δ is advanced."""
-_MAX_PAUSE_US = 500_000
+MAX_PAUSE_US = 500_000
 """µs between two set-points; after a longer pause δ begins anew at zero."""
-_MAX_OFFSET_M = 0.5
+MAX_OFFSET_M = 0.5
 """m: largest δ on each axis; for the plans of the shipped files it is 0.3 m."""
 NOTHING: Array = np.zeros(3)
 """No addition."""
@@ -76,7 +76,7 @@ class PlanFeedforward:
         inverse = loop.inverse
         if inverse is None:
             return Additions(acceleration=_level(loop.derivative * plan(now + loop.lead_us).acceleration[:2]))
-        if self._last is None or not 0 <= now - self._last <= _MAX_PAUSE_US:
+        if self._last is None or not 0 <= now - self._last <= MAX_PAUSE_US:
             self.reset()
             self._last = now
             self._advance(now, 0, plan, loop, inverse, drag)
@@ -96,7 +96,7 @@ class PlanFeedforward:
         needed = (later.acceleration - here.acceleration + drag * later.velocity)[:2]
         offset, speed, total, change = self._state
         offset = offset + dt * (speed + 0.5 * dt * change)
-        offset = np.minimum(np.maximum(offset, -_MAX_OFFSET_M), _MAX_OFFSET_M)
+        offset = np.minimum(np.maximum(offset, -MAX_OFFSET_M), MAX_OFFSET_M)
         speed = speed + dt * change
         closing = speed + loop.position * offset
         total = total + dt * closing

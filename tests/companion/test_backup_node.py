@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.agreements import Agreements
-from companion.avoidance.certified.committed import committed, horizon_of
+from companion.avoidance.certified.committed import carried_on, committed, horizon_of
 from companion.avoidance.certified.fingerprint import fingerprint, identity
 from companion.avoidance.certified.negotiation import Geometry
 from companion.backup_node import BackupNode
@@ -389,3 +389,21 @@ def test_an_acceleration_that_is_no_number_is_not_continued() -> None:
     bench.speaks = False
     for _, message in bench.run(2.0):
         assert np.isfinite([*message.position, *message.velocity, *message.acceleration]).all()
+
+
+def test_a_pause_of_the_companion_across_epochs_ends_nothing() -> None:
+    """Plans arrive during the pause, and the one that was flown at its beginning is over at its end."""
+    bench = Compensating(ARDUPILOT)
+    bench.plans = [carried_on(bench.plans[0], k) for k in range(8)]
+    assert bench.run(0.56) == []
+    bench.speaks = False
+    assert bench.run(0.07) == []
+    # Then the epoch that began after 0.6 s is flown.
+    (sent,) = bench.node.step(bench.now, [bench.tell("swarm", told(plan)) for plan in bench.plans])
+    (message,) = bench.reader.feed(sent.data)
+    assert isinstance(message, SetpointLocal)
+    place, _, _ = bench.motion(bench.now)
+    np.testing.assert_allclose(enu_to_ned(place), message.position, atol=1e-4)
+    bench.now += TICK
+    bench.speaks = True
+    assert bench.run(1.0) == []

@@ -131,10 +131,12 @@ class CertifiedPlan:
             "period_us": 20_000,
             "companion": {
                 "task": "goto",
+                "tracking": {"compensate": True},
                 "avoidance": "certified",
                 "limits": {
                     "u_max": [1.5, 1.5, 1.0],
                     "v_max": list(_V_MAX),
+                    "j_max": [3.5, 3.5, 3.5],
                     "box_min": [-width, -width, 2.5],
                     "box_max": [2 * width, 2 * width, 30.0],
                 },

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.config import CompanionConfig
 from mavlink_bridge.frames import FleetFrame
 from outrider.errors import InputError
 from outrider.preflight.tube import tracking_error
@@ -18,6 +19,10 @@ from trials.measures import tracking_errors
 from trials.separation import Track
 
 Array = NDArray[np.float64]
+
+
+LEAD_US: Final = CompanionConfig(avoidance="certified").setpoint_lead_us
+"""Time (µs) by which the companions of a trial send set-points ahead."""
 
 
 class CertifiedTracking(NamedTuple):
@@ -55,7 +60,7 @@ def certified_tracking(
     for log in logs:
         # A log of less than ten seconds of flight is refused.
         with suppress(InputError):
-            errors.append(tracking_error(log, system, planar=False).largest)
+            errors.append(tracking_error(log, system, planar=False, lead=LEAD_US).largest)
     flights = [flown_by_clock(log, system, fleet, seconds) for log in logs]
     known = [flight for flight in flights if flight is not None]
     reported = max(errors, default=None)
