@@ -66,7 +66,7 @@ class Planning:
         avoidance.pause(now - self._stepped)
         self._stepped = now
         if not self._pilot.streaming or view.own is None or view.local is None:
-            avoidance.rest()
+            avoidance.rest(now, None if view.own is None else view.own.velocity)
             return
         stale = view.own.age > self._config.guard.own_stale_us
         # A faulty autopilot, or a sender that uses its id, must not cause set-points above v_max.
