@@ -124,8 +124,11 @@ class Avoidance(Protocol):
         """Discard the horizon that is flown."""
         ...
 
-    def rest(self) -> None:
-        """Discard the horizon and the state of tracking while set-points do not control the vehicle."""
+    def rest(self, now: int, velocity: Array | None) -> None:
+        """Discard the horizon and the state of tracking while set-points do not control the vehicle.
+
+        ``velocity`` (3,), m/s: the measured one at ``now`` (µs), or None.
+        """
         ...
 
     def park(self, now: int, measured: Motion, stance: Stance) -> None:

@@ -108,10 +108,7 @@ class CertifiedAvoidance:
         if self._flight.commitment.current is not None:
             return True
         self._waits_since = now if self._waits_since is None else self._waits_since
-        if float(abs(measured.velocity).max()) >= _REST_SPEED:
-            self._rests_since = None
-        elif self._rests_since is None:
-            self._rests_since = now
+        self._watch_rest(now, measured.velocity)
         rested = self._rests_since is not None and now - self._rests_since >= _REST_US
         return rested or now - self._waits_since >= 1e6 * self.lookahead_s
 
@@ -134,14 +131,22 @@ class CertifiedAvoidance:
     def pause(self, gap: int) -> None:
         """Do nothing: a committed plan stays valid."""
 
+    def _watch_rest(self, now: int, velocity: Array | None) -> None:
+        """Record since when the vehicle has been at rest."""
+        if velocity is None or float(abs(velocity).max()) >= _REST_SPEED:
+            self._rests_since = None
+        elif self._rests_since is None:
+            self._rests_since = now
+
     def discard(self) -> None:
         """Discard the horizon that is flown."""
         self.horizon = None
 
-    def rest(self) -> None:
+    def rest(self, now: int, velocity: Array | None) -> None:
         """Discard the horizon and the state of tracking, because set-points do not steer the vehicle."""
         self.horizon = None
         self.tracking.reset()
+        self._watch_rest(now, velocity)
 
     def finish(self) -> None:
         """Make no further plan: the committed one is flown to its end, and then its last position held."""

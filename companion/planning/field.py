@@ -117,7 +117,7 @@ class FieldAvoidance:
         """Discard the horizon that is flown."""
         self.guard.horizon = None
 
-    def rest(self) -> None:
+    def rest(self, now: int, velocity: Array | None) -> None:
         """Discard the horizon and the state of tracking, because set-points do not steer the vehicle."""
         self.guard.rest()
         self.tracking.reset()

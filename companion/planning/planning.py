@@ -67,13 +67,13 @@ class Planning:
         avoidance.pause(now - self._stepped)
         self._stepped = now
         if view.own is None or view.local is None:
-            avoidance.rest()
+            avoidance.rest(now, None if view.own is None else view.own.velocity)
             return
         stale = view.own.age > self._config.guard.own_stale_us
         # A faulty autopilot, or a sender that uses its id, must not cause set-points above v_max.
         measured = Motion(view.own.position, clipped(view.own.velocity, self.fastest), _ZERO)
         if not self._pilot.streaming:
-            avoidance.rest()
+            avoidance.rest(now, view.own.velocity)
             stance = self._pilot.stance
             if stance is Stance.CLIMBS or (stance.grounded and not stale):
                 avoidance.park(now, measured, stance)
