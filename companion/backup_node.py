@@ -344,7 +344,9 @@ class BackupNode:
         loop = profile.loop
         of_plan = self._feedforward.step(time, self._planned, loop, USUAL_DRAG)
         ahead = self._planned(time + loop.lead_us).acceleration - planned.acceleration
-        sent = ahead + self._compensation.at(planned.velocity[:2]) + of_plan.acceleration
+        compensation, most = self._compensation.at(planned.velocity[:2]), self._config.tracking.most
+        compensation *= min(1.0, most / max(float(np.linalg.norm(compensation)), most))
+        sent = ahead + compensation + of_plan.acceleration
         return of_plan._replace(acceleration=sent)
 
     def _planned(self, time: int) -> Motion:

@@ -103,7 +103,7 @@ class CertifiedConfig(Settings):
     )
     lead_us: int = Field(
         60_000,
-        ge=0,
+        gt=0,
         le=2_000_000,
         description="µs before the end of an epoch at which the plan of the next one is made",
     )
@@ -158,4 +158,7 @@ class CertifiedConfig(Settings):
             raise ValueError(f"certified.epoch_us must be a multiple of dt_us = {self.dt_us}")
         if self.last_call_us >= self.epoch_us:
             raise ValueError(f"certified.last_call_us must be less than epoch_us = {self.epoch_us}")
+        if self.last_call_us > self.lead_us:
+            # Each epoch would be over for messages before its plan is to be made: there would be none.
+            raise ValueError(f"certified.last_call_us must be at most lead_us = {self.lead_us}")
         return self

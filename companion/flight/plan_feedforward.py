@@ -95,9 +95,9 @@ class PlanFeedforward:
         here, later = plan(self._last), plan(self._last + inverse.lag_us)
         needed = (later.acceleration - here.acceleration + drag * later.velocity)[:2]
         offset, speed, total, change = self._state
-        offset = offset + dt * (speed + 0.5 * dt * change)
-        offset = np.minimum(np.maximum(offset, -MAX_OFFSET_M), MAX_OFFSET_M)
-        speed = speed + dt * change
+        moved = offset + dt * (speed + 0.5 * dt * change)
+        offset = np.minimum(np.maximum(moved, -MAX_OFFSET_M), MAX_OFFSET_M)
+        speed = np.where(moved == offset, speed + dt * change, 0.0)
         closing = speed + loop.position * offset
         total = total + dt * closing
         change = needed - loop.velocity * closing - inverse.integral * total

@@ -91,7 +91,8 @@ class CertifiedAvoidance:
         """Do nothing: committed plans use no methods."""
 
     def keep(self, lowered: Lowered) -> None:
-        """Do nothing: the limits of committed plans are those of the configuration."""
+        """Bound what set-points add to the plan; the limits of plans are those of the configuration."""
+        self.tracking.keep(lowered.acceleration)
 
     def begin(self, now: int, measured: Motion) -> None:
         """Hold the ``measured`` position, or continue the committed plan, see ``CertifiedFlight.stand``.

@@ -8,12 +8,16 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from outrider.errors import OutriderError
 
 INTERRUPTED = 3
 """Exit status of a command that Ctrl-C or SIGTERM ended before its result was complete."""
+
+
+_SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
+"""Signals that suspend a process: Ctrl-Z, and a terminal's signals to background processes."""
 
 
 @contextmanager
@@ -70,3 +74,14 @@ def insisted(came: Sequence[ReceivedSignal]) -> bool:
 
 
 _MIN_REPEAT_S = 1.0
+
+
+@contextmanager
+def suspending_signals_ignored() -> Iterator[None]:
+    """Ignore the suspending signals: a suspended process could neither relay orders nor request a hold."""
+    before = {which: signal.signal(which, signal.SIG_IGN) for which in _SUSPENDING}
+    try:
+        yield
+    finally:
+        for which, handler in before.items():
+            signal.signal(which, handler)

@@ -255,6 +255,11 @@ class Agreements:
                 found.add(system)
         return found | self.near(self.left)
 
+    def on_columns(self) -> bool:
+        """Return whether all agreements that are kept are on own columns, so that all planes are upright."""
+        peers = [peer for peer in self._peers.values() if peer.left is None]
+        return all(self._on_column(one) for peer in peers for one in peer.pair.kept)
+
     def _on_column(self, one: Agreement) -> bool:
         own = self._plans.get(one.own)
         return own is not None and own.plan.column

@@ -141,7 +141,8 @@ class Commitment:
     def leave_column(self) -> None:
         """Make the column, which rests, a plan in space from the next epoch on, at the height that is flown.
 
-        All agreements that it keeps have upright planes, so it keeps them at any height.
+        Another height than that of the plan was flown only while all planes were upright (``hover``), and
+        agreements since then are on the column: so this plan keeps them, too.
         """
         start = self.start()
         self.following = start.at_height(start.position_m[2] if self.height is None else self.height)

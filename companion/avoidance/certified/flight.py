@@ -103,15 +103,17 @@ class CertifiedFlight:
         announced for this epoch or a later one, because others rely on it. A column continues at the height
         of ``position``, unless another controller has flown the vehicle far from it. Otherwise a plan at rest
         at ``position`` begins, which is not announced before the companion is in control; ``anchored_anew``
-        counts this if a plan had been announced.
+        counts this if a plan had been announced. The column of a vehicle that was parked does not continue:
+        it may be nearer to the others' plans than an agreement in the air allows.
         """
         self._polled_at = now
         self.agreements.rejoin()
         commitment, horizon = self.commitment, self.commitment.horizon()
-        if horizon is not None:
+        parked = commitment.column and not self.reservation.joined and not self._in_control
+        if horizon is not None and not parked:
             difference = horizon.at(now).position - position
             if commitment.column:
-                commitment.hover(position[2])
+                self._hover(position[2])
                 if hypot(difference[0], difference[1]) <= self._column_within:
                     self._hold_column(now)
                     return
@@ -155,13 +157,18 @@ class CertifiedFlight:
         within its tube, and each member has an agreement.
         """
         commitment = self.commitment
-        commitment.hover(measured.position[2])
+        self._hover(measured.position[2])
         horizon = commitment.horizon()
         if self._hold_column(now) and horizon is not None and flies and not self.agreements.missing():
             off = horizon.at(now).position - measured.position
             inside = float(off @ off) <= self._config.certified.tube**2
             if inside and now >= rest_time(horizon):
                 commitment.leave_column()
+
+    def _hover(self, height: float) -> None:
+        """Fly the column at ``height`` (m), while all agreements that are kept have upright planes."""
+        if self.agreements.on_columns():
+            self.commitment.hover(height)
 
     def _hold_column(self, now: int) -> bool:
         """Continue the plan, as a column; return whether the plan of the next epoch was made now."""

@@ -87,7 +87,8 @@ class Reservation:
 
     def reserved(self, now: int) -> bool:
         """Return whether the plans that others fly at ``now`` (µs) keep clear of the column."""
-        if self._since is None or not self._commitment.column:
+        # A statement that was received since the last ``watch`` may have taken an agreement back.
+        if self._since is None or not self._commitment.column or self._agreements.unreserved():
             return False
         return now >= self._commitment.epoch(self._since) + 2 * self._config.epoch_us
 

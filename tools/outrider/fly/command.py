@@ -6,8 +6,7 @@ import json
 import signal
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, nullcontext, suppress
+from contextlib import closing, nullcontext, suppress
 from pathlib import Path
 from typing import Final
 
@@ -25,7 +24,7 @@ from outrider.fly.request import Request
 from outrider.fly.screen import Screen
 from outrider.fly.terminal import Terminal
 from outrider.fly.wiring import Wiring, wire
-from outrider.interruption import ReceivedSignal, noted
+from outrider.interruption import ReceivedSignal, noted, suspending_signals_ignored
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION
 from outrider.runs.directories import new_directory
@@ -34,8 +33,6 @@ from outrider.terminal.lines import say
 FAULT: Final = 3
 """Exit status of a flight that ended with a fault."""
 _STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-_SUSPENDING: Final = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
-"""Signals that suspend a process: Ctrl-Z, and a terminal's signals to background processes."""
 
 
 def run(asked: Request) -> int:
@@ -57,7 +54,7 @@ def run(asked: Request) -> int:
 def _live(asked: Request) -> int:
     config, began = asked.config, time.monotonic()
     wiring = wire(asked.endpoints, config.system, config.target, config.settings, WallClock())
-    with closing(wiring), noted(_STOPS) as stops, _suspending_signals_ignored():
+    with closing(wiring), noted(_STOPS) as stops, suspending_signals_ignored():
         directory = new_directory(asked.out, f"fly-{config.system}")
         document = config.model_dump(mode="json")
         try:
@@ -110,14 +107,3 @@ def _flown(
                 screen.live.stop()
             terminal.close()
         return flight
-
-
-@contextmanager
-def _suspending_signals_ignored() -> Iterator[None]:
-    """Ignore the suspending signals: a suspended process could neither relay orders nor request a hold."""
-    before = {which: signal.signal(which, signal.SIG_IGN) for which in _SUSPENDING}
-    try:
-        yield
-    finally:
-        for which, handler in before.items():
-            signal.signal(which, handler)

@@ -29,7 +29,7 @@ from outrider.fly.instance_lock import instance_lock
 from outrider.fly.line_input import typing
 from outrider.fly.log import Log
 from outrider.fly.read_only_link import ReadOnlyLink
-from outrider.interruption import insisted, noted
+from outrider.interruption import insisted, noted, suspending_signals_ignored
 from outrider.key_files import key_of
 from outrider.preflight.course import Box, box_of
 from outrider.preflight.findings import Verdict
@@ -224,6 +224,7 @@ def flown(
     system = node.system
     with (
         noted(STOPS) as stops,
+        suspending_signals_ignored(),
         typing(False) as typed,
         Log(folder / f"preflight-{system}", system, lambda why: say(f"preflight: {why}")) as log,
     ):

@@ -41,6 +41,7 @@ class Turns:
     ) -> None:
         self._system, self._others, self._fingerprint = system, tuple(others), fingerprint
         self._make, self._wait, self.go = make, wait, go
+        self._go_given = go
         self.flight: LoneFlight | None = None
         self.stage = Stage.CHECKS
         self.asks = False
@@ -108,15 +109,17 @@ class Turns:
             if now - self._waited_from > self._wait:
                 self.end(trouble)
             self.doing = f"waiting: {trouble}"
+            # A go counts only while nothing else is missing.
+            self.go = self._go_given
             return
         self._waited_from = None
         before = [one for one in self._others if one < self._system]
         early = [one for one in self._others if self._stage(one) is Stage.CHECKS]
         waits = early or [one for one in before if self._stage(one) is not Stage.LANDED]
         if waits:
-            self.doing = f"waiting for the flight of vehicle {min(waits)}"
+            self.doing, self.go = f"waiting for the flight of vehicle {min(waits)}", self._go_given
         elif not disarmed:
-            self.doing = "waiting until the own vehicle is disarmed"
+            self.doing, self.go = "waiting until the own vehicle is disarmed", self._go_given
         elif not self.go:
             self.asks, self.doing = True, "waiting for the operator's go: type go, and the vehicle takes off"
         elif self._make is not None:
@@ -149,7 +152,7 @@ class Turns:
         if self.stage is not Stage.LANDED:
             return False
         if any(self._stage(one) is Stage.ENDED for one in self._others):
-            return not any(self._stage(one) is Stage.FLIES for one in self._others)
+            return not any(self._stage(one) is Stage.FLIES and self._fresh(one, now) for one in self._others)
         silent = [one for one in self._others if not self._fresh(one, now)]
         if silent:
             self._waited_from = now if self._waited_from is None else self._waited_from

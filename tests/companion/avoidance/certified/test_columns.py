@@ -17,6 +17,7 @@ from companion.avoidance.certified.negotiation import Negotiation
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.draws import delays, losses
 from tests.companion.avoidance.certified.swarm import NEVER, Habits, Rough, Swarm, Vehicle
+from tests.companion.avoidance.certified.two import LENGTH, NOW, OTHER, OWN, agreed, plan
 
 UNTIL = 6_000_000
 """µs of a run."""
@@ -91,6 +92,20 @@ def test_columns_matter_in_these_flights() -> None:
     least = [at_random(seed, Rough()).least() for seed in range(8)]
     d = at_random(0, Rough()).d
     assert min(least) < d + 0.1
+
+
+def test_planes_are_upright_only_once_no_agreement_on_a_plan_in_space_is_kept() -> None:
+    """Until then a column must not be flown, or become a plan in space, at another height."""
+    two = agreed()
+    for number in (1, 2):
+        assert not two.first.on_columns()
+        for system, x in ((OWN, 0.0), (OTHER, 4.0)):
+            two.make(system, plan(number, x)._replace(column=system == OWN))
+        assert not two.first.on_columns()
+        two.agree(NOW + number * LENGTH)
+        if two.first.on_columns():
+            break
+    assert two.first.on_columns()
 
 
 def test_who_is_below_a_hovering_vehicle_waits_and_does_not_stop_it() -> None:
