@@ -163,7 +163,7 @@ def test_a_newer_plan_counts_whatever_arrives_last():
         plan(X, V, a=np.zeros((0, 3))),
         plan(X, V)._replace(payload=b""),
         plan(X, V)._replace(payload=plan(X, V).payload[:-1]),
-        plan(X, V)._replace(payload=b"\x02" + plan(X, V).payload[1:]),
+        plan(X, V)._replace(payload=b"\x03" + plan(X, V).payload[1:]),
         plan(X, V)._replace(payload=bytes(128)),
     ],
     ids=["another frame", "from the future", "from far ahead", "empty", "nothing", "cut", "kind", "zeros"],

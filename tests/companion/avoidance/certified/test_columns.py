@@ -79,7 +79,8 @@ def test_a_column_is_kept_whatever_happens(seed: int, loss: float, delay: int) -
 def test_all_take_off_fly_and_land(rough: Rough) -> None:
     """Beside each other at once, also where messages are lost, and each back at its place."""
     row, above = places(3, 1), wandering(3, 1)
-    swarm = Swarm(row, rough, [Habits(takes_off=0, lands=5_000_000)] * 3, 1)
+    # They are back after five seconds: one that landed on its way could cover the place of another.
+    swarm = Swarm(row, rough, [Habits(takes_off=0, lands=10_000_000)] * 3, 1)
     swarm.run(16_000_000, lambda since, system: above(since, system) if since < 5e6 else row[system - 1])
     assert not swarm.faults()
     for vehicle in swarm.vehicles:
