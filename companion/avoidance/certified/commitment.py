@@ -37,6 +37,7 @@ class HoldReason(Enum):
     MISSING = "an input is missing: an agreement with a member, the own position, or the destination"
     CLOCK = "the clock of a member, or the own clock, is wrong"
     UNSOLVED = "no plan that keeps all planes was found"
+    ROUNDING = "the plan found breaks a plane after rounding, and none keeps it by the rounding error"
 
 
 class Commitment:
@@ -175,6 +176,7 @@ class Commitment:
             start.position_m, start.velocity_m_s, self._last_acceleration(), start.accelerations_m_s2
         )
         # Rounding may violate a plane that is only just kept: the second attempt adds the rounding error.
+        reason = HoldReason.UNSOLVED
         for attempt in range(2):
             if attempt:
                 wanted = np.maximum(corridor.wanted, corridor.least + self._rounding)
@@ -184,6 +186,7 @@ class Commitment:
                 plan, points = committed_with_controls(start, answer.accelerations)
             except (SolverError, CertificateError):
                 continue
+            reason = HoldReason.ROUNDING
             # The rounded plan is checked, because the others receive the rounded one.
             if kept(corridor, points):
                 ways = others.controls[:, -1, 2] - others.controls[:, 0, 0]
@@ -196,7 +199,7 @@ class Commitment:
                 )
                 self.following = plan
                 return True
-        self.carry_on(HoldReason.UNSOLVED)
+        self.carry_on(reason)
         return False
 
     def anchor(self, now: int, measured: Motion) -> int:
