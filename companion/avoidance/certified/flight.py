@@ -64,6 +64,8 @@ class CertifiedFlight:
         )
         self.clocks = ClockWatch(own, certified.clock_us)
         self._column_within = max(config.guard.tube, certified.drift)
+        # The feed-forward of set-points needs the next plan before the lag of the attitude reaches it.
+        self._lead = certified.epoch_us if config.tracking.compensate else certified.lead_us
         self._replies: list[Timesync] = []
         self._seconds: Array = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
         self._steps = steps
@@ -185,11 +187,11 @@ class CertifiedFlight:
     def due(self, now: int) -> bool:
         """Begin the next epoch if it is time; return True if ``plan`` is to be called for it now.
 
-        That is ``lead_us`` before the end of the epoch, when no member's clock is wrong and there is an
-        agreement with each member: what is known late in the epoch still counts. If an agreement on the
-        newest plans is about to be made, the plan waits for it until the last call
-        (``Commitment.last_call``). Without an agreement with a member, the committed plan is continued for an
-        epoch at the last call.
+        That is ``lead_us`` before the end of the epoch, or with compensation at its beginning, when no
+        member's clock is wrong and there is an agreement with each member: what is known late in the epoch
+        still counts. If an agreement on the newest plans is about to be made, the plan waits for it until the
+        last call (``Commitment.last_call``). Without an agreement with a member, the committed plan is
+        continued for an epoch at the last call.
         """
         self._polled_at, self._in_control = now, True
         self.agreements.rejoin()
@@ -205,7 +207,7 @@ class CertifiedFlight:
                 self.commitment.carry_on(HoldReason.CLOCK if wrong else HoldReason.MISSING)
             return False
         epoch = self.commitment.epoch(now)
-        if now + self._config.certified.lead_us < epoch + self._config.certified.epoch_us:
+        if now + self._lead < epoch + self._config.certified.epoch_us:
             return False
         return self.commitment.last_call(now) or not self.agreements.outdated(now, epoch)
 
