@@ -13,14 +13,13 @@ from math import exp
 
 import numpy as np
 
+from companion.flight.tracking import MAX_DRAG
 from companion.values.horizon import Array
 
 _TIME_CONSTANT_S = 3.0
 """Time (s) in which an observation loses its weight to 1/e."""
 _LEAST_VARIANCE = 0.01
 """Variance of the speed (m²/s²) that is added to the estimate, so that a hover gives no drag."""
-_MAX_DRAG = 2.0
-"""1/s: largest drag κ."""
 _MAX_PERIOD_S = 0.5
 """s between two observations; after a longer pause the estimate begins anew."""
 
@@ -51,5 +50,5 @@ class SentCompensation:
         if self._last is None:
             return np.zeros(3)
         _, before, compensation = self._last
-        drag = min(max(self._covariance / (self._variance + _LEAST_VARIANCE), 0.0), _MAX_DRAG)
+        drag = min(max(self._covariance / (self._variance + _LEAST_VARIANCE), 0.0), MAX_DRAG)
         return np.append(compensation + drag * (velocity - before), 0.0)

@@ -49,7 +49,7 @@ The second bound limits the effect of a jump of the estimated position, which is
 """
 _MAX_PULL = 0.5
 """m/s: largest velocity that corrects the position error."""
-_MAX_DRAG = 2.0
+MAX_DRAG = 2.0
 """1/s: largest drag κ."""
 _MAX_PERIOD_S = 0.1
 """s between two observations; after a longer pause the prediction restarts, and κ, w and c are kept."""
@@ -247,7 +247,7 @@ class Tracking:
         gain = self._drag_variance / (_DISTURBANCE_NOISE / dt + self._drag_variance * square)
         drag = self._drag + gain * float(velocity_change @ disturbance_change - self._drag * square)
         self._drag_variance *= 1.0 - gain * square
-        drag = min(max(drag, 0.0), _MAX_DRAG)
+        drag = min(max(drag, 0.0), MAX_DRAG)
         # A change of κ moves part of the disturbance from w to the drag: their sum remains the same.
         self._residual = self._residual + (self._drag - drag) * velocity
         self._drag = drag

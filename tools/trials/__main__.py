@@ -16,7 +16,7 @@ from outrider.errors import InputError, OutriderError
 from outrider.runs.directories import new_directory
 from outrider.scenarios.places import Origin
 from outrider.terminal.lines import say
-from trials.autopilots import autopilots
+from trials.autopilots import add_option, autopilots
 from trials.mishaps import ENDED, mishaps
 from trials.plan import FLAVOURS, MISHAPS, SORTIE, STORIES, Plan
 from trials.progress import Progress
@@ -41,13 +41,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--speed", type=float, help="of emulated time; 10 if not said, for a sortie and real firmware 1"
     )
-    parser.add_argument(
-        "--autopilots",
-        action="append",
-        default=[],
-        metavar="WHAT",
-        help="real firmware's simulations: arducopter:PATH ARGUMENTS, px4:PATH, 3*px4:PATH, or ENDPOINT,…",
-    )
+    add_option(parser)
     parser.add_argument("--origin", help="LATITUDE,LONGITUDE,ALTITUDE of the first vehicle")
     parser.add_argument("--out", type=Path, help="a new directory for all files")
     asked = parser.parse_args(words)

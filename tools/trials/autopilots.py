@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from argparse import ArgumentParser
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -53,6 +54,17 @@ class Running:
 
 
 Autopilot = Program | Running
+
+
+def add_option(parser: ArgumentParser) -> None:
+    """Add ``--autopilots``, which may be given several times."""
+    parser.add_argument(
+        "--autopilots",
+        action="append",
+        default=[],
+        metavar="WHAT",
+        help="real firmware's simulations: arducopter:PATH ARGUMENTS, px4:PATH, 3*px4:PATH, or ENDPOINT,…",
+    )
 
 
 def autopilots(texts: Sequence[str]) -> tuple[Autopilot, ...]:

@@ -22,7 +22,7 @@ from outrider.certify.verdict import judge
 from outrider.errors import InputError, OutriderError
 from outrider.runs.directories import new_directory
 from outrider.terminal.lines import say
-from trials.autopilots import autopilots
+from trials.autopilots import add_option, autopilots
 from trials.certified_flight import CertifiedFlight
 from trials.certified_plan import KINDS, PROCESSES, SIGMA, TUBE, CertifiedPlan
 from trials.certified_tracking import certified_tracking, logs_of
@@ -140,13 +140,7 @@ def main(words: Sequence[str] | None = None) -> int:
         default=SENSORS[0],
         help="error of emulated estimates; reported positions are judged",
     )
-    parser.add_argument(
-        "--autopilots",
-        action="append",
-        default=[],
-        metavar="WHAT",
-        help="real firmware's simulations: arducopter:PATH ARGUMENTS, px4:PATH, 3*px4:PATH, or ENDPOINT,…",
-    )
+    add_option(parser)
     parser.add_argument("--out", type=Path, help="a new directory for all files")
     asked = parser.parse_args(words)
     signal.signal(signal.SIGTERM, signal.default_int_handler)

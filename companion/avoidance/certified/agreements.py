@@ -249,16 +249,19 @@ class Agreements:
         They are the members without an agreement on an own column that both state, those with which another
         agreement is still kept, and departed ones whose last plan is too near.
         """
-        found = self.missing()
-        for system, peer in self._peers.items():
-            if peer.left is None and not all(self._on_column(one) for one in peer.pair.kept):
-                found.add(system)
-        return found | self.near(self.left)
+        return self.missing() | self._in_space() | self.near(self.left)
 
     def on_columns(self) -> bool:
         """Return whether all agreements that are kept are on own columns, so that all planes are upright."""
-        peers = [peer for peer in self._peers.values() if peer.left is None]
-        return all(self._on_column(one) for peer in peers for one in peer.pair.kept)
+        return not self._in_space()
+
+    def _in_space(self) -> set[int]:
+        """Return the vehicles with which an agreement is kept that is not on an own column."""
+        return {
+            system
+            for system, peer in self._peers.items()
+            if peer.left is None and not all(self._on_column(one) for one in peer.pair.kept)
+        }
 
     def _on_column(self, one: Agreement) -> bool:
         own = self._plans.get(one.own)
