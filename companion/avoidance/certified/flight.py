@@ -174,11 +174,7 @@ class CertifiedFlight:
 
     def _hold_column(self, now: int) -> bool:
         """Continue the plan, as a column; return whether the plan of the next epoch was made now."""
-        self._polled_at, self._in_control = now, True
-        self.agreements.rejoin()
-        turned = self.commitment.turn(now)
-        if not (turned and self.commitment.unannounced):
-            self._agree(now)
+        turned = self._take_part(now)
         if turned:
             self.commitment.raise_column()
         self.reservation.watch(now)
@@ -193,12 +189,8 @@ class CertifiedFlight:
         last call (``Commitment.last_call``). Without an agreement with a member, the committed plan is
         continued for an epoch at the last call.
         """
-        self._polled_at, self._in_control = now, True
-        self.agreements.rejoin()
+        turned = self._take_part(now)
         self.reservation.watch(now)
-        turned = self.commitment.turn(now)
-        if not (turned and self.commitment.unannounced):
-            self._agree(now)
         if not turned:
             return False
         wrong = not self.clocks.wrong.isdisjoint(self.agreements.members)
@@ -210,6 +202,15 @@ class CertifiedFlight:
         if now + self._lead < epoch + self._config.certified.epoch_us:
             return False
         return self.commitment.last_call(now) or not self.agreements.outdated(now, epoch)
+
+    def _take_part(self, now: int) -> bool:
+        """Fly the plan of this epoch and agree; return whether that of the next one is to be made."""
+        self._polled_at, self._in_control = now, True
+        self.agreements.rejoin()
+        turned = self.commitment.turn(now)
+        if not (turned and self.commitment.unannounced):
+            self._agree(now)
+        return turned
 
     def _agree(self, now: int) -> None:
         """Take and propose agreements if a message was received or a plan was made."""
