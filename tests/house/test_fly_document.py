@@ -13,8 +13,8 @@ from companion.config import CompanionConfig
 from companion.values.phase import Phase
 from mavlink_bridge.links.endpoints import parse_endpoint
 from outrider.__main__ import app
-from outrider.fly.link_budget import FLEET, SHARE, room, said, said_by_target
-from outrider.fly.orders import WORDS
+from outrider.onboard.link_budget import FLEET, SHARE, room, said, said_by_target
+from outrider.onboard.orders import WORDS
 from outrider.resources import find
 from outrider.scenarios.fly_config import RADIOS, FlyConfig
 from outrider.yaml_files.yaml_file import load

@@ -13,8 +13,8 @@ import pytest
 
 from mavlink_bridge.loops.priority import LEVEL
 from outrider.__main__ import main
-from outrider.fly import command
-from outrider.fly.request import Request
+from outrider.onboard import command
+from outrider.onboard.request import Request
 from outrider.resources import config_root
 
 UNITS = Path(__file__).parents[2] / "config" / "systemd"

@@ -21,8 +21,8 @@ from mavlink_bridge.messages import (
     ParamSet,
     SetpointLocal,
 )
-from outrider.fly.status import StatusReports
-from outrider.fly.transmit_statistics import TransmitStatistics
+from outrider.onboard.status import StatusReports
+from outrider.onboard.transmit_statistics import TransmitStatistics
 from outrider.resources import find
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.supervision.supervised_node import SupervisedNode

@@ -13,7 +13,7 @@ import numpy as np
 
 from outrider.simulation.beacon import Beacon
 from outrider.simulation.paths import Motion
-from tests.outrider.fly.process import FLEET, HOST
+from tests.outrider.onboard.process import FLEET, HOST
 
 
 class Switch:

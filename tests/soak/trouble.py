@@ -17,7 +17,7 @@ from struct import pack
 from typing import Final
 
 from mavlink_bridge.messages import CommandLong, ParamSet, SetMode, Source
-from tests.outrider.fly.process import GUIDED, HELD
+from tests.outrider.onboard.process import GUIDED, HELD
 from tests.soak.birds import Bird
 
 GROUND: Final = Source(255, 190)

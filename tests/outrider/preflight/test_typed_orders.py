@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import pytest
 
 from outrider.errors import OutriderError
-from outrider.fly.line_input import LineInput
 from outrider.interruption import ReceivedSignal
+from outrider.onboard.line_input import LineInput
 from outrider.preflight.course import Box
 from outrider.preflight.node import Preflight
 from outrider.preflight.terms import FlightTerms, Terms

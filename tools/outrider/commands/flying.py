@@ -311,8 +311,8 @@ def fly(
     from outrider.terminal.compilation import say_if_compiling
 
     say_if_compiling()
-    from outrider.fly.command import run
-    from outrider.fly.request import Options, checked
+    from outrider.onboard.command import run
+    from outrider.onboard.request import Options, checked
 
     options = Options(
         autopilot,

@@ -24,13 +24,13 @@ from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
 from outrider.errors import InputError
-from outrider.fly.hold_on_exit import farewell
-from outrider.fly.instance_lock import instance_lock
-from outrider.fly.line_input import typing
-from outrider.fly.log import Log
-from outrider.fly.read_only_link import ReadOnlyLink
 from outrider.interruption import insisted, noted, suspending_signals_ignored
 from outrider.key_files import key_of
+from outrider.onboard.hold_on_exit import farewell
+from outrider.onboard.instance_lock import instance_lock
+from outrider.onboard.line_input import typing
+from outrider.onboard.log import Log
+from outrider.onboard.read_only_link import ReadOnlyLink
 from outrider.preflight.course import Box, box_of
 from outrider.preflight.findings import Verdict
 from outrider.preflight.node import Preflight

@@ -25,7 +25,7 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CommandInt, Heartbeat, Source
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
-from outrider.fly.orders import OPERATOR, Orders
+from outrider.onboard.orders import OPERATOR, Orders
 from outrider.preflight.course import Box, outside
 from outrider.preflight.tube import TrackingError, TrackingMeter
 

@@ -8,9 +8,9 @@ from difflib import get_close_matches
 from typing import Final
 
 from outrider.errors import OutriderError
-from outrider.fly.line_input import LineInput
-from outrider.fly.orders import QUIT
 from outrider.interruption import ReceivedSignal
+from outrider.onboard.line_input import LineInput
+from outrider.onboard.orders import QUIT
 from outrider.preflight.node import Preflight
 
 STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
