@@ -14,7 +14,16 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import BY_TYPE, Message, SetupSigning, Source, Vector
+from mavlink_bridge.messages import (
+    BY_TYPE,
+    CommandInt,
+    CommandLong,
+    HilState,
+    Message,
+    SetupSigning,
+    Source,
+    Vector,
+)
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.packing import parcels
@@ -37,6 +46,10 @@ from sitl.autopilot.reception import Reception
 from sitl.autopilot.saved import Saved
 from sitl.autopilot.services import Services
 from sitl.autopilot.trust import SigningSetup
+from sitl.camera.camera import Camera
+from sitl.camera.scene import LINK as SIGHT
+from sitl.camera.scene import Scene
+from sitl.camera.service import CameraService
 from sitl.config.autopilot import AutopilotConfig
 from sitl.environment.weather import WeatherConfig
 from sitl.estimation.sensors import Estimate
@@ -51,7 +64,7 @@ from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.multirotor import Reference, VehicleState
 
 LINK: Final = "autopilot"
-"""The only link of the node."""
+"""Link of all messages; the ground truth that a camera sees comes on the link ``sight``."""
 
 # Message ids; the services add their own.
 _RECEIVED: Final = frozenset(
@@ -75,7 +88,7 @@ _FIRMWARE: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPil
 
 
 class Autopilot:
-    """One vehicle with its autopilot, as a ``Node`` with the link ``autopilot``.
+    """One vehicle with its autopilot and its camera, as a ``Node`` with the link ``autopilot``.
 
     The physics runs in the NED frame of ``site``; messages use the vehicle's own local NED. The autopilot
     flies on the estimate of its sensors. The program that composes a simulation can read the truth of the
@@ -92,13 +105,14 @@ class Autopilot:
         weather: WeatherConfig | None = None,
         saved: Saved | None = None,
         signing: Signing | None = None,
+        scene: Scene | None = None,
     ) -> None:
         """Start at the configured place, on the ground or at the configured height above it.
 
         The place becomes the origin of the vehicle's local frame. ``seed`` (≥ 0) and the system id seed all
         noise. ``weather`` describes the surrounding air; without it the air is still. ``saved`` is the data
         kept from an earlier run. ``signing`` is the autopilot's own, with the key shared by all authorised
-        senders; without it any sender may command the autopilot.
+        senders; without it any sender may command the autopilot. ``scene``: what the vehicle's camera may see.
         """
         saved = saved or Saved()
         self._values = Values(_TABLES[config.flavour](len(vehicle.rotors)), config, saved.parameters)
@@ -190,6 +204,12 @@ class Autopilot:
         self._services.handlers[SetupSigning] = self._trust.set_up
         received = _RECEIVED | {BY_TYPE[kind].id for kind in self._services.handlers}
         self._codec = Codec(lambda message_id, _system, _component: message_id in received, signing)
+        self.camera: Camera | None = None
+        if vehicle.camera is not None:
+            self.camera = Camera(vehicle.camera, scene or Scene(), self._origin, site, seed, config.system_id)
+            self._camera_service = CameraService(self.camera)
+            truth = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
+            self._sight_codec = Codec(lambda message_id, _system, _component: message_id == truth)
         # These values are cached because they are empty or not due in nearly every step.
         self._reached = navigation.itinerary.reached
         self._work_due = self._services.next_due
@@ -210,7 +230,8 @@ class Autopilot:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Advance to ``now`` (µs), process the received datagrams, then return the messages due.
 
-        The result is one datagram or none, and more only after a flood of requests. Messages received at
+        The result is one datagram or none, and more only after a flood of requests. All messages about one image
+        are in one datagram. Messages received at
         ``now`` take effect from ``now`` on. The first call is the boot.
         """
         if self._boot is None:
@@ -222,6 +243,8 @@ class Autopilot:
             self._signing.present(self._clock.boot_epoch + self._now)
         self._plant.move(self._now, armed=self._commander.armed)
         self._watch()
+        if self.camera is not None:
+            self._take_image(self.camera)
         for datagram in inbox:
             self._receive(datagram)
         return self._send()
@@ -238,7 +261,18 @@ class Autopilot:
         if self._now >= self._failsafes.next_due:
             self._failsafes.watch(self._now)
 
+    def _take_image(self, camera: Camera) -> None:
+        """Let the camera see the truth of the last physics step, once the position is known."""
+        plant, stamp = self._plant, self._clock.stamp
+        if self._commander.ready:
+            boot = self._boot or 0
+            camera.step(plant.time, boot, plant.state, plant.estimate, stamp(plant.time))
+
     def _receive(self, datagram: Datagram) -> None:
+        if datagram.link == SIGHT and self.camera is not None:
+            for sight in self._sight_codec.feed(datagram.data, whole=True):
+                if isinstance(sight, HilState):
+                    self.camera.receive(sight)
         if datagram.link != LINK:
             return
         enough = len(self._outbox) + _MAX_ANSWERS
@@ -246,6 +280,8 @@ class Autopilot:
             if len(self._outbox) >= enough:
                 # Answers go to all receivers: excessive requests of one sender would crowd out the others.
                 break
+            if self.camera is not None and isinstance(message, CommandLong | CommandInt):
+                self._outbox += self._camera_service.handle(message, self._clock.stamp(self._now))
             mode = self._commander.mode
             self._reception.handle(message, self._now, self._plant.estimate())
             if self._announces and self._commander.mode is not mode:
@@ -264,9 +300,14 @@ class Autopilot:
             reported = self._telemetry.collect(self._now, self._snapshots.read(self._now))
             # If there are many answers, the messages sent first are more likely to fit the link.
             messages = reported + messages if len(messages) > _MAX_ANSWERS else messages + reported
-        if not messages:
+        seen = [] if self.camera is None else self.camera.messages(self._now, self._boot or 0)
+        if not messages and not seen:
             return []
-        data = parcels([encoded for message in messages if (encoded := self._encoded(message))])
+        pieces = [encoded for message in messages if (encoded := self._encoded(message))]
+        if seen:
+            # In one piece: what belongs to one image stays in one datagram.
+            pieces.append(b"".join(map(self._encoded, seen)))
+        data = parcels(pieces)
         self._outbox.clear()
         return [Datagram(LINK, parcel) for parcel in data]
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from sitl.values.camera import CameraConfig
 from sitl.vehicle.allocation import effectiveness
 from sitl.vehicle.ground import GRAVITY
 
@@ -101,6 +102,7 @@ class VehicleConfig(BaseModel):
     physics_period: int = Field(
         2500, gt=0, le=20_000, multiple_of=4, description="step of physics and controller (µs)"
     )
+    camera: CameraConfig | None = Field(None, description="camera that it carries; null: none")
 
     @model_validator(mode="after")
     def _can_fly(self) -> Self:

@@ -1,0 +1,95 @@
+"""Bodies that hide what is behind them: balls, columns, and the ground. Site NED, metres."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple, Protocol
+
+Point = tuple[float, float, float]
+
+
+class Body(Protocol):
+    """Opaque body."""
+
+    def hides(self, eye: Point, point: Point) -> bool:
+        """Return whether it crosses the straight line from ``eye`` to ``point``."""
+
+    def moved(self, by: Point) -> Body:
+        """Return it moved."""
+
+
+class Ball(NamedTuple):
+    """Ball around ``centre``."""
+
+    centre: Point
+    radius: float
+
+    def hides(self, eye: Point, point: Point) -> bool:
+        """Return whether the line from ``eye`` to ``point`` comes nearer to the centre than the radius."""
+        x, y, z = (b - a for a, b in zip(eye, point, strict=True))
+        p, q, r = (c - a for a, c in zip(eye, self.centre, strict=True))
+        square = x * x + y * y + z * z
+        share = (p * x + q * y + r * z) / square if square else 0.0
+        share = max(0.0, min(1.0, share))
+        return math.hypot(p - share * x, q - share * y, r - share * z) < self.radius
+
+    def moved(self, by: Point) -> Ball:
+        """Return the ball with its centre moved."""
+        return Ball((self.centre[0] + by[0], self.centre[1] + by[1], self.centre[2] + by[2]), self.radius)
+
+
+class Column(NamedTuple):
+    """Vertical cylinder around ``axis`` (north, east), without a lower end; its upper end is at ``top`` (down).
+
+    A moving column keeps its upper end.
+    """
+
+    axis: tuple[float, float]
+    radius: float
+    top: float
+
+    def hides(self, eye: Point, point: Point) -> bool:
+        """Return whether the line from ``eye`` to ``point`` crosses the cylinder below its upper end."""
+        x, y = point[0] - eye[0], point[1] - eye[1]
+        p, q = self.axis[0] - eye[0], self.axis[1] - eye[1]
+        square, along = x * x + y * y, p * x + q * y
+        apart = p * p + q * q - self.radius**2
+        if square == 0.0:
+            if apart >= 0.0:
+                return False
+            first, last = 0.0, 1.0
+        else:
+            root = along * along - square * apart
+            if root <= 0.0:
+                return False
+            half = math.sqrt(root)
+            first, last = max(0.0, (along - half) / square), min(1.0, (along + half) / square)
+        if first >= last:
+            return False
+        lowest = max(eye[2] + share * (point[2] - eye[2]) for share in (first, last))
+        return lowest > self.top
+
+    def moved(self, by: Point) -> Column:
+        """Return the cylinder with its axis moved horizontally."""
+        return self._replace(axis=(self.axis[0] + by[0], self.axis[1] + by[1]))
+
+
+class Ground(NamedTuple):
+    """Level ground at ``down`` (m)."""
+
+    down: float
+
+    def hides(self, eye: Point, point: Point) -> bool:
+        """Return whether ``eye`` or ``point`` is below the ground."""
+        return max(eye[2], point[2]) > self.down
+
+    def moved(self, by: Point) -> Ground:
+        """Return the ground moved vertically."""
+        return Ground(self.down + by[2])
+
+
+def hidden(eye: Point, points: Iterable[Point], bodies: Iterable[Body]) -> bool:
+    """Return whether any of ``bodies`` hides any of ``points`` from ``eye``."""
+    seen = list(points)
+    return any(body.hides(eye, point) for body in bodies for point in seen)
