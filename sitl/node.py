@@ -13,7 +13,7 @@ import numpy.typing as npt
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import (
     BY_TYPE,
     CommandInt,
@@ -58,6 +58,7 @@ from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
 from sitl.telemetry.streams import usual_rates
 from sitl.values.origin import Origin
+from sitl.values.setpoints import ZERO
 from sitl.vehicle.airframe import hover_speeds
 from sitl.vehicle.battery import Battery
 from sitl.vehicle.config import VehicleConfig
@@ -81,6 +82,8 @@ _RECEIVED: Final = frozenset(
         mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET,
     )
 )
+_TRUTH: Final[int] = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
+_SHOWN_US: Final = 50_000
 # Limit of messages in answer to one datagram; the rest of the datagram is ignored.
 _MAX_ANSWERS: Final = 32
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
@@ -112,7 +115,8 @@ class Autopilot:
         The place becomes the origin of the vehicle's local frame. ``seed`` (≥ 0) and the system id seed all
         noise. ``weather`` describes the surrounding air; without it the air is still. ``saved`` is the data
         kept from an earlier run. ``signing`` is the autopilot's own, with the key shared by all authorised
-        senders; without it any sender may command the autopilot. ``scene``: what the vehicle's camera may see.
+        senders; without it any sender may command the autopilot. ``scene``: what the vehicle's camera may
+        see; with it, the vehicle also sends where it truly is on the link ``sight``.
         """
         saved = saved or Saved()
         self._values = Values(_TABLES[config.flavour](len(vehicle.rotors)), config, saved.parameters)
@@ -205,11 +209,12 @@ class Autopilot:
         received = _RECEIVED | {BY_TYPE[kind].id for kind in self._services.handlers}
         self._codec = Codec(lambda message_id, _system, _component: message_id in received, signing)
         self.camera: Camera | None = None
+        self._truth_codec = Codec(lambda message_id, _system, _component: message_id == _TRUTH)
+        # Others' cameras see this vehicle.
+        self._shows, self._next_shown = scene is not None, 0
         if vehicle.camera is not None:
             self.camera = Camera(vehicle.camera, scene or Scene(), self._origin, site, seed, config.system_id)
             self._camera_service = CameraService(self.camera)
-            truth = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
-            self._sight_codec = Codec(lambda message_id, _system, _component: message_id == truth)
         # These values are cached because they are empty or not due in nearly every step.
         self._reached = navigation.itinerary.reached
         self._work_due = self._services.next_due
@@ -230,9 +235,9 @@ class Autopilot:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Advance to ``now`` (µs), process the received datagrams, then return the messages due.
 
-        The result is one datagram or none, and more only after a flood of requests. All messages about one image
-        are in one datagram. Messages received at
-        ``now`` take effect from ``now`` on. The first call is the boot.
+        The result is one datagram or none, and more only after a flood of requests. All messages about one
+        image are in one datagram. Messages received at ``now`` take effect from ``now`` on. The first call is
+        the boot.
         """
         if self._boot is None:
             self._boot = now
@@ -247,7 +252,7 @@ class Autopilot:
             self._take_image(self.camera)
         for datagram in inbox:
             self._receive(datagram)
-        return self._send()
+        return self._send() + self._show()
 
     def _watch(self) -> None:
         was_ready = self._commander.ready
@@ -268,9 +273,20 @@ class Autopilot:
             boot = self._boot or 0
             camera.step(plant.time, boot, plant.state, plant.estimate, stamp(plant.time))
 
+    def _show(self) -> list[Datagram]:
+        """Return the truth about this vehicle, for the cameras of others, if it is due."""
+        if not self._shows or self._now < self._next_shown:
+            return []
+        self._next_shown = self._now + _SHOWN_US
+        plant = self._plant
+        latitude, longitude, altitude = self._origin.site.to_geodetic(ned_to_enu(plant.state.position))
+        time = plant.time + (self._boot or 0)
+        truth = HilState(self._source, time, latitude, longitude, altitude, ZERO)
+        return [Datagram(SIGHT, self._truth_codec.encode(truth))]
+
     def _receive(self, datagram: Datagram) -> None:
         if datagram.link == SIGHT and self.camera is not None:
-            for sight in self._sight_codec.feed(datagram.data, whole=True):
+            for sight in self._truth_codec.feed(datagram.data, whole=True):
                 if isinstance(sight, HilState):
                     self.camera.receive(sight)
         if datagram.link != LINK:

@@ -58,13 +58,15 @@ class Channel(NamedTuple):
     """Broadcast domain: a datagram that a member sends on its link reaches every other member on *its* link.
 
     ``members``: node name → that node's name for its link into this channel. ``overrides``: faults in place
-    of ``faults`` for one direction.
+    of ``faults`` for one direction. ``counted``: whether its datagrams count as traffic; if not, no other
+    channel has its names of links.
     """
 
     name: str
     members: Mapping[str, str]
     faults: Faults = Faults()
     overrides: Mapping[Direction, Faults] = MappingProxyType({})
+    counted: bool = True
 
     def between(self, sender: str, receiver: str) -> Faults:
         """Return the faults from ``sender`` to ``receiver``.

@@ -21,7 +21,7 @@ __all__ = ["Channel", "Faults", "NetworkCounters", "SimulatedNetwork"]
 
 
 class NetworkCounters(NamedTuple):
-    """Counts of datagrams; each datagram counts once per receiver.
+    """Counts of datagrams on channels that are counted; each datagram counts once per receiver.
 
     The sum sent + duplicated equals delivered + dropped + still under way. ``dropped``: lost, cut off, or
     arrived at a full buffer; ``unrouted``: datagrams on a link that no channel carries.
@@ -122,11 +122,14 @@ class SimulatedNetwork:
         self._cuts: list[_Cut] = []
         self._sent = self._delivered = self._dropped = self._duplicated = self._unrouted = 0
         self._names: set[str] = set()
+        self._uncounted: set[str] = set()
         for channel in sorted(channels, key=lambda channel: channel.name):
             channel.check()
             if channel.name in self._names:
                 raise BridgeError(f"two channels are named {channel.name!r}")
             self._names.add(channel.name)
+            if not channel.counted:
+                self._uncounted.update(channel.members.values())
             for sender, link in channel.members.items():
                 self._queues.setdefault(sender, [])
                 self._sequences.setdefault(sender, 0)
@@ -160,7 +163,8 @@ class SimulatedNetwork:
             for paths in branches:
                 number = self._sequences[sender]
                 self._sequences[sender] = number + 1
-                self._sent += len(paths)
+                if link not in self._uncounted:
+                    self._sent += len(paths)
                 latency, link_name, arrival = -1, "", None
                 for path in paths:
                     if path.deterministic and now >= path.blocked_until:
@@ -186,6 +190,8 @@ class SimulatedNetwork:
                 return []
             arrived = self._arrivals(now, node)
         self._delivered += len(arrived)
+        if self._uncounted:
+            self._delivered -= sum(datagram.link in self._uncounted for datagram in arrived)
         return arrived
 
     def keep(self, now: int, node: str, room: int) -> None:

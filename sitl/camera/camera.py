@@ -75,8 +75,8 @@ class Camera:
     ) -> None:
         """Take an image if one is due at ``now`` (µs since boot).
 
-        ``boot`` (µs): time of the boot, on the clock of the sightings; ``state`` and ``estimate`` are those of
-        ``now``, which is ``stamp`` on the autopilot's clock.
+        ``boot`` (µs): time of the boot, on the clock of the sightings; ``state`` and ``estimate`` are those
+        of ``now``, which is ``stamp`` on the autopilot's clock.
         """
         self.mount.advance(1e-6 * (now - self._then))
         self._then = now

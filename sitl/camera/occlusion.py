@@ -40,9 +40,9 @@ class Ball(NamedTuple):
 
 
 class Column(NamedTuple):
-    """Vertical cylinder around ``axis`` (north, east), without a lower end; its upper end is at ``top`` (down).
+    """Vertical cylinder around ``axis`` (north, east), without a lower end.
 
-    A moving column keeps its upper end.
+    Its upper end is at ``top`` (down), also when it moves.
     """
 
     axis: tuple[float, float]

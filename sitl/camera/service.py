@@ -36,7 +36,7 @@ class CameraService:
         self._camera = camera
 
     def handle(self, message: CommandLong | CommandInt, stamp: int) -> list[Message]:
-        """Execute a command that arrived at ``stamp`` (µs since boot, the autopilot's clock); return answers."""
+        """Execute a command that arrived at ``stamp`` (µs, the autopilot's clock); return the answers."""
         camera = self._camera
         source = camera.source
         if message.target_system not in (0, source.system):
@@ -93,7 +93,7 @@ class CameraService:
 
 
 def information(camera: Camera, stamp: int) -> CameraInformation:
-    """Return CAMERA_INFORMATION (259) at ``stamp`` (µs since boot); its optics give the pinhole's focal length."""
+    """Return CAMERA_INFORMATION (259) at ``stamp`` (µs since boot), with the optics of the pinhole."""
     config = camera.config
     width, height = config.resolution
     pixel = _SENSOR_WIDTH_MM / width

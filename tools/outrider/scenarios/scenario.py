@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from companion.config.companion import CompanionConfig, Moving, Obstacle
+from outrider.scenarios.cameras import CameraConfig, VehicleCamera, camera_faults
 from outrider.scenarios.faults import Clocks, FaultPart
 from outrider.scenarios.links import ROLES, AllLinks, PartitionPart
 from outrider.scenarios.moving import MovingPart, clashes
@@ -101,6 +102,12 @@ class Scenario(Part):
         (), max_length=50, description="obstacles that move; their system ids are 190 and so on"
     )
     sensors: Literal["truth", "rtk", "gnss", "sih"] = "truth"
+    camera: CameraConfig | None = Field(
+        None, description="of every vehicle but the bystanders; null: that of the vehicle's file, if any"
+    )
+    cameras: tuple[VehicleCamera, ...] = Field(
+        (), max_length=244, description="other cameras of single vehicles"
+    )
     weather: WeatherConfig = WeatherConfig()
     d_min: Length = Field(0.5, description="m between centres of vehicles; below it is a violation")
     d_min_target: Length | None = Field(None, description="m to the target; null: the target is no obstacle")
@@ -211,6 +218,7 @@ class Scenario(Part):
         if isinstance(self.target, RecordedTarget) and self.target.system in self.systems:
             yield f"target.system = {self.target.system} is the id of a vehicle of the fleet"
         target = self.target.system if isinstance(self.target, RecordedTarget) else TARGET_SYSTEM
+        yield from camera_faults(self.cameras, self.systems)
         yield from clashes(self.moving_known, self.systems, target, self.companion.moving)
         for index, fault in enumerate(self.faults):
             if fault.vehicle not in self.systems:

@@ -19,18 +19,22 @@ from companion.values.bearings import bearing
 from mavlink_bridge.clocks.node_clock import NodeClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.network.simulated import Channel, Faults
+from mavlink_bridge.node import Node
 from outrider.runs import names
+from outrider.scenarios.cameras import CameraConfig
 from outrider.scenarios.companion_settings import settings_of
 from outrider.scenarios.faults import AutopilotClockFault, ClockFault
 from outrider.scenarios.links import Links
 from outrider.scenarios.scenario import FixedTarget, PathTarget, Scenario
 from outrider.scenarios.starts import starts
 from outrider.scenarios.streams import Stream, stream
+from outrider.simulation import sight
 from outrider.simulation.bystander import Bystander
 from outrider.simulation.moving import MovingObstacle
 from outrider.simulation.operator import Operator
 from outrider.simulation.system_clocks import EmulatedSystemClock
 from outrider.simulation.targets import Recorded, StandingTarget, Target, Walking
+from sitl.camera.scene import Scene
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
 from sitl.vehicle.config import VehicleConfig
@@ -159,7 +163,38 @@ class Fleet:
             clock_drift_ppm=clock.drift_ppm,
             start_height=float(start[2]) if self.scenario.airborne else 0.0,
         )
-        return Autopilot(config, self.vehicle, self.frame, self.seed, weather=self.scenario.weather)
+        vehicle = self.vehicle.model_copy(update={"camera": self.camera_of(k)})
+        return Autopilot(
+            config, vehicle, self.frame, self.seed, weather=self.scenario.weather, scene=self._scene(k)
+        )
+
+    def camera_of(self, k: int) -> CameraConfig | None:
+        """Return the camera of vehicle ``k``, None if it has none."""
+        scenario = self.scenario
+        for one in scenario.cameras:
+            if one.vehicle == self.systems[k]:
+                return one.camera
+        return (scenario.camera or self.vehicle.camera) if k < scenario.vehicles else None
+
+    @property
+    def has_cameras(self) -> bool:
+        """Whether any vehicle has a camera."""
+        return any(self.camera_of(k) is not None for k in range(self.scenario.size))
+
+    def _scene(self, k: int) -> Scene | None:
+        """Return what the camera of vehicle ``k`` may see; None if no vehicle has a camera."""
+        if not self.has_cameras:
+            return None
+        scenario, radius = self.scenario, 0.5 * self.vehicle.span
+        others = {system: radius for system in self.systems if system != self.systems[k]}
+        return sight.scene(self.target_system, scenario.obstacles, scenario.moving_known, others)
+
+    def shown(self, target: Target, moving: Sequence[MovingObstacle]) -> list[Node]:
+        """Return the nodes of target and obstacles, such that cameras see them if there are any."""
+        if not self.has_cameras:
+            return [target, *moving]
+        obstacles = [sight.Shown(one, one.system, one.position, self.frame) for one in moving]
+        return [sight.Shown(target, target.system, target.position, self.frame), *obstacles]
 
     def _autopilot_clock(self, k: int) -> AutopilotClockFault:
         """Return the errors of the clock of autopilot ``k``: none without such a fault."""
@@ -220,6 +255,9 @@ class Fleet:
         swarm = [End(name, "swarm", words) for name, words in companions]
         swarm += [End(names.moving(s), "swarm", ("moving", s)) for s in self.scenario.moving_systems]
         channels.append(_channel("swarm", swarm, links.swarm))
+        if self.has_cameras:
+            bodies = [names.TARGET, *map(names.moving, self.scenario.moving_systems)]
+            channels.append(sight.channel([*map(names.autopilot, self.systems), *bodies]))
         return channels
 
 

@@ -83,7 +83,7 @@ class Flight:
 
         Raises OutriderError if another process of the flight fails.
         """
-        others = schedule(self.scenario, self.target, *self.moving, self.operator)
+        others = schedule(self.scenario, *self.fleet.shown(self.target, self.moving), self.operator)
         try:
             self._team.start()
             self._vehicles.run(others, self._watch, taps, reverse=self._reverse)

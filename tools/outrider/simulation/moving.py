@@ -44,6 +44,10 @@ class MovingObstacle:
         """Return the true position and velocity at ``now`` (µs)."""
         return self.walk.motion(now)
 
+    def position(self, now: int) -> Array:
+        """Return the true position at ``now`` (µs)."""
+        return self.walk.motion(now).position
+
     def horizon(self, now: int) -> Horizon:
         """Return the trajectory from ``now`` (µs) on.
 

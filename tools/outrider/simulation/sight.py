@@ -1,0 +1,86 @@
+"""Ground truth for cameras: what they may see, and the messages that say where it is.
+
+No companion is on the link ``sight``. It has no faults, and its messages do not count as traffic of a flight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from companion.config.companion import Moving, Obstacle
+from companion.config.obstacles import MovingSphere, Sphere
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import HilState, Source
+from mavlink_bridge.network.simulated import Channel, Faults
+from mavlink_bridge.node import Datagram, Node
+from mavlink_bridge.wire.codec import Codec
+from outrider.simulation.paths import Array
+from sitl.camera.occlusion import Ball, Body, Column, Ground, Point
+from sitl.camera.scene import LINK, Scene
+
+CHANNEL = "sight"
+DELAY_US = 20_000
+"""µs: no less than the time between two exchanges of a flight's processes, and less than cameras take."""
+_GROUND_M = 0.05
+"""m below the ground: the foot of an object that stands on the ground is not hidden by it."""
+_HERE = (0.0, 0.0, 0.0)
+
+
+class Shown:
+    """``node`` with a true position ``place`` (fleet-local ENU at a time, µs), which it shows as ``system``.
+
+    It shows it in each of its steps.
+    """
+
+    def __init__(
+        self, node: Node, system: int, place: Callable[[int], Array | None], fleet: FleetFrame
+    ) -> None:
+        self.name = node.name
+        self._node, self._place, self._fleet = node, place, fleet
+        self._source = Source(system, mavlink.MAV_COMP_ID_AUTOPILOT1)
+        self._codec = Codec()
+
+    def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
+        """Step the node, and show where it is."""
+        said = self._node.step(now, inbox)
+        place = self._place(now)
+        if place is None:
+            return said
+        latitude, longitude, altitude = self._fleet.to_geodetic(place)
+        truth = HilState(self._source, now, latitude, longitude, altitude, _HERE)
+        return [*said, Datagram(LINK, self._codec.encode(truth))]
+
+
+def channel(members: Sequence[str]) -> Channel:
+    """Return the channel between the nodes ``members``."""
+    return Channel(CHANNEL, dict.fromkeys(members, LINK), Faults(delay=DELAY_US), counted=False)
+
+
+def scene(
+    target: int, obstacles: Sequence[Obstacle], moving: Sequence[Moving], vehicles: Mapping[int, float]
+) -> Scene:
+    """Return what cameras may see.
+
+    ``target``: system id of the tracked object; ``vehicles``: radii (m) of the vehicles, by system id.
+    """
+    bodies: dict[int, Body] = {system: Ball(_HERE, radius) for system, radius in vehicles.items()}
+    for one in moving:
+        if isinstance(one, MovingSphere):
+            bodies[one.system] = Ball(_HERE, one.radius)
+        else:
+            bodies[one.system] = _column((0.0, 0.0), one.radius, one.height)
+    return Scene(target, (Ground(_GROUND_M), *map(_fixed, obstacles)), bodies)
+
+
+def _fixed(obstacle: Obstacle) -> Body:
+    if isinstance(obstacle, Sphere):
+        east, north, up = obstacle.at
+        centre: Point = (north, east, -up)
+        return Ball(centre, obstacle.radius)
+    return _column(obstacle.at, obstacle.radius, obstacle.height)
+
+
+def _column(at: tuple[float, float], radius: float, height: float) -> Column:
+    return Column((at[1], at[0]), radius, -height)
