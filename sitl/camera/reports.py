@@ -91,11 +91,11 @@ def geo_status(
     )
     across = np.array((-east / level, north / level, 0.0))
     return said._replace(
-        horizontal_accuracy=math.sqrt(errors[0, 0] + errors[1, 1]),
-        vertical_accuracy=math.sqrt(errors[2, 2]),
+        horizontal_accuracy=_root(errors[0, 0] + errors[1, 1]),
+        vertical_accuracy=_root(errors[2, 2]),
         distance=math.hypot(level, down),
         heading=math.atan2(east, north),
-        heading_accuracy=math.sqrt(float(across @ errors @ across)) / level,
+        heading_accuracy=_root(across @ errors @ across) / level,
     )
 
 
@@ -118,3 +118,8 @@ def image_status(source: Source, config: CameraConfig, camera: Pinhole, seen: Ex
         None,
         rectangle,
     )
+
+
+def _root(square: float) -> float:
+    """Return the root of a sum of squares that rounding may have made negative."""
+    return math.sqrt(max(0.0, square))

@@ -64,6 +64,15 @@ def test_arrivals_are_ordered_by_time_then_sender_then_sequence() -> None:
     assert values == [97, 197, 98, 198, 99, 199, 0]
 
 
+def test_datagrams_on_a_channel_that_is_not_counted_arrive_and_do_not_count() -> None:
+    light = Channel("light", {"a": "sight", "b": "sight"}, counted=False)
+    network = SimulatedNetwork([Channel("air", CREW), light], 1, TICK)
+    network.send(0, "a", numbered(1, "sight") + numbered(2))
+    assert sorted(network.receive(TICK, "b")) == sorted(numbered(1, "sight") + numbered(2, "radio"))
+    assert network.receive(TICK, "c") == numbered(2)
+    assert network.counters[:2] == (2, 2)
+
+
 def any_faults(loss: st.SearchStrategy[float], burst: st.SearchStrategy[float]) -> st.SearchStrategy[Faults]:
     share, time = st.floats(0, 1), st.integers(0, 50_000)
     return st.builds(Faults, time, time, loss, share, share, burst)
