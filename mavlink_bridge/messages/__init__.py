@@ -12,6 +12,7 @@ its subject.
 
 from __future__ import annotations
 
+from mavlink_bridge.messages.cameras import *
 from mavlink_bridge.messages.commands import *
 from mavlink_bridge.messages.declaration import BY_ID, BY_TYPE, Converter, Message
 from mavlink_bridge.messages.links import *

@@ -1,8 +1,8 @@
-"""Messages about the surroundings: tracked targets, obstacle distances, air traffic; and values to plot."""
+"""Messages about the surroundings: obstacle distances, air traffic; and values to plot."""
 
 from __future__ import annotations
 
-from math import degrees, isfinite, nan, radians, remainder, tau
+from math import degrees, isfinite, radians, remainder, tau
 from typing import NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -18,7 +18,7 @@ from mavlink_bridge.messages.fields import (
     degrees_e7,
     on_globe,
 )
-from mavlink_bridge.messages.source import Source, Vector
+from mavlink_bridge.messages.source import Source
 
 SECTORS = 72
 _NAME = 10
@@ -113,44 +113,6 @@ class NamedValue(NamedTuple):
         if not isfinite(self.value):
             raise EncodeError(f"NAMED_VALUE_FLOAT: value = {self.value} is not finite")
         return self.time_boot // 1000, self.value, ascii_bytes("NAMED_VALUE_FLOAT: name", self.name, _NAME)
-
-
-@message("CAMERA_TRACKING_GEO_STATUS")
-class CameraTrackingGeo(NamedTuple):
-    """CAMERA_TRACKING_GEO_STATUS (276): position of the object that a camera tracks.
-
-    Degrees, m above mean sea level, m/s NED (None if unknown). ``status`` is CAMERA_TRACKING_STATUS_FLAGS: 1
-    while tracking. The message has no time stamp.
-    """
-
-    source: Source
-    status: int
-    latitude: float
-    longitude: float
-    altitude: float
-    velocity_ned: Vector | None
-
-    @staticmethod
-    def decode(source: Source, fields: Fields) -> CameraTrackingGeo | None:
-        latitude, longitude, altitude = fields[:3]
-        # A camera reports an unknown velocity as NaN; accuracies may hold any value.
-        north, east, down = fields[5:8]
-        if not (on_globe(latitude, longitude) and isfinite(altitude)):
-            return None
-        velocity = (north, east, down) if isfinite(north + east + down) else None
-        return CameraTrackingGeo(source, fields[12], latitude / 1e7, longitude / 1e7, altitude, velocity)
-
-    def encode(self) -> Fields:
-        return (
-            *degrees_e7(self.latitude, self.longitude),
-            self.altitude,
-            nan,
-            nan,
-            *(self.velocity_ned or (nan, nan, nan)),
-            *(nan,) * 4,
-            self.status,
-            0,
-        )
 
 
 @message("OBSTACLE_DISTANCE", finite=True)

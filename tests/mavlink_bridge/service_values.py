@@ -18,7 +18,6 @@ from tests.mavlink_bridge.wire_values import (
     scaled,
     signed,
     source,
-    speed,
     u8,
     u16,
     u32,
@@ -187,12 +186,6 @@ def scans(draw: st.DrawFn) -> m.ObstacleDistance:
 
 
 @st.composite
-def tracked(draw: st.DrawFn) -> m.CameraTrackingGeo:
-    velocity: Any = draw(st.none() | vector(speed))
-    return m.CameraTrackingGeo(draw(source), draw(u8), draw(latitude), draw(longitude), draw(f32), velocity)
-
-
-@st.composite
 def figures(draw: st.DrawFn) -> m.NamedValue:
     return m.NamedValue(draw(source), draw(boot), draw(name)[:10], draw(f32))
 
@@ -200,6 +193,5 @@ def figures(draw: st.DrawFn) -> m.NamedValue:
 SURROUNDINGS: Kinds = {
     m.AdsbVehicle: traffic(),
     m.NamedValue: figures(),
-    m.CameraTrackingGeo: tracked(),
     m.ObstacleDistance: scans(),
 }

@@ -15,6 +15,7 @@ from mavlink_bridge import messages as m
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.messages import BY_ID, BY_TYPE
 from mavlink_bridge.wire.codec import Codec
+from tests.mavlink_bridge.camera_values import CAMERAS
 from tests.mavlink_bridge.service_values import MISSIONS, SERVICES, STATUS, SURROUNDINGS
 from tests.mavlink_bridge.wire_values import (
     boot,
@@ -105,6 +106,7 @@ KINDS: dict[type[m.Message], st.SearchStrategy[Any]] = {
     **MISSIONS,
     **STATUS,
     **SURROUNDINGS,
+    **CAMERAS,
 }
 # What version 1 leaves out reads as zero.
 EXTENSIONS: dict[type[m.Message], dict[str, Any]] = {
