@@ -155,7 +155,7 @@ class CameraTrackingGeo(NamedTuple):
 
     @staticmethod
     def decode(source: Source, fields: Fields) -> CameraTrackingGeo | None:
-        latitude, longitude, altitude, horizontal, vertical, north, east, down = fields[:8]
+        latitude, longitude, altitude, _, _, north, east, down = fields[:8]
         if not (on_globe(latitude, longitude) and isfinite(altitude)):
             return None
         velocity = (north, east, down) if isfinite(north + east + down) else None
@@ -166,9 +166,12 @@ class CameraTrackingGeo(NamedTuple):
             longitude / 1e7,
             altitude,
             velocity,
-            _known(horizontal),
-            _known(vertical),
-            *map(_known, fields[8:12]),
+            _known(fields[3]),
+            _known(fields[4]),
+            _known(fields[8]),
+            _known(fields[9]),
+            _known(fields[10]),
+            _known(fields[11]),
             fields[13],
         )
 
