@@ -13,7 +13,7 @@ from pydantic import ConfigDict, Field, model_validator
 from companion.config.certified import CertifiedConfig
 from companion.config.estimation import TrackConfig
 from companion.config.flight import GroundMessagesConfig, GuardConfig, RatesConfig, TrackingConfig
-from companion.config.formation import FormationConfig, Nearest, Spread
+from companion.config.formation import FormationConfig, Nearest
 from companion.config.obstacles import (
     Moving,
     MovingPost,
@@ -115,7 +115,9 @@ class CompanionConfig(Settings):
         (), max_length=255, description="surfaces of vehicles with a surface of their own"
     )
     formation: FormationConfig = Field(
-        Nearest(), description="how the vehicles share the surface: each its nearest point, or spread evenly"
+        Nearest(),
+        description="how the vehicles share the surface: each its nearest point, spread evenly, or at the"
+        " bearings from which all together locate the target best",
     )
     turn_rate: float = Field(
         0.0, ge=-1.0, le=1.0, description="rad/s, counter-clockwise from above: the ring turns on its surface"
@@ -129,8 +131,8 @@ class CompanionConfig(Settings):
 
     @property
     def shares_surface(self) -> bool:
-        """Whether the vehicles spread on one surface."""
-        return isinstance(self.formation, Spread)
+        """Whether the destinations of the vehicles depend on each other."""
+        return not isinstance(self.formation, Nearest)
 
     def surface_of(self, system: int) -> Surface:
         """Return the surface of the vehicle with the id ``system``."""

@@ -9,14 +9,16 @@ import numpy as np
 
 from companion.avoidance.field.planner import Aim, standing
 from companion.config import CompanionConfig
-from companion.config.formation import Spread
+from companion.config.formation import Perception, Spread
 from companion.config.planning import LimitsConfig
 from companion.estimation.tracks import State
 from companion.estimation.turn_rate import Path
 from companion.goals.formation import even_turn, outside, spacing, taking_part
+from companion.goals.perception import PerceptionFormation
 from companion.goals.settling import Settling
 from companion.values.bearings import turned
 from companion.values.horizon import Array, Motion
+from companion.values.mates import Mates, Sight
 from companion.values.obstacles import Obstacles
 from companion.values.phase import Phase
 from companion.world import View
@@ -35,9 +37,7 @@ its start.
 _BLOCKED_WITHIN_M, _NO_PROGRESS_TIMEOUT_US = 5.0, 10_000_000
 """A vehicle within this distance of its start that has come no nearer for this time is back, too."""
 
-
-_NO_POSITIONS = np.empty((0, 3))
-_NO_POSITIONS.flags.writeable = False
+_NO_MATES, _NO_SIGHT = Mates(), Sight()
 
 
 class Flight(Protocol):
@@ -79,6 +79,12 @@ class Goals:
         self._pilot = pilot
         self._lookahead_s = lookahead_s
         self._surface = config.surface_of(system)
+        formation = config.formation
+        self._perception = (
+            PerceptionFormation(config, formation, system, lookahead_s)
+            if isinstance(formation, Perception)
+            else None
+        )
         self._settling = Settling(config)
         self._phase: Phase | None = None
         self._held: Array | None = None
@@ -117,21 +123,22 @@ class Goals:
         view: View,
         measured: Motion,
         obstacles: Obstacles,
-        neighbours: Array = _NO_POSITIONS,
+        mates: Mates = _NO_MATES,
         smaller_ids: int = 0,
+        sight: Sight = _NO_SIGHT,
         *,
         cautious: bool,
     ) -> Aim:
         """Return the aim of a plan at ``now`` (µs) from ``measured`` on.
 
         ``cautious`` limits the distance to the destination to what ``guard.cautious_speed`` covers within a
-        horizon. ``obstacles``: what settling keeps clear of. ``neighbours`` (M, 3), m: positions of those
-        that share the surface. ``smaller_ids``: how many neighbours have a smaller id. Raises SurfaceError if
-        the function of a user's surface fails.
+        horizon. ``obstacles``: what settling keeps clear of. ``mates``: those that share the surface.
+        ``smaller_ids``: how many neighbours have a smaller id. ``sight``: of the target. Raises SurfaceError
+        if the function of a user's surface fails.
         """
         step = self._config.guard.return_step
         self._lane = step * smaller_ids + self._clearance if step else 0.0
-        aim = self._destination(now, view, measured, obstacles, neighbours)
+        aim = self._destination(now, view, measured, obstacles, mates, sight)
         speed = self._config.guard.cautious_speed
         return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
 
@@ -149,7 +156,7 @@ class Goals:
         return aim._replace(destination=measured.position + drift + longest / distance * offset)
 
     def _destination(
-        self, now: int, view: View, measured: Motion, obstacles: Obstacles, neighbours: Array
+        self, now: int, view: View, measured: Motion, obstacles: Obstacles, mates: Mates, sight: Sight
     ) -> Aim:
         """Return the aim of the present phase and task, before ``cautious`` shortens it."""
         target, phase, task = view.target, self._pilot.phase, self._config.task
@@ -163,17 +170,20 @@ class Goals:
             began = measured.position if self._began is None else self._began
             place = began if self.goal is None else self.goal
         elif phase is not Phase.HOLD and target is not None:
-            return self._around(target, measured, neighbours)
+            return self._around(now, target, measured, mates, sight)
         else:
             # Ordered to hold, or there is no target: hold the position.
             place = self._place_to_hold(measured)
         return standing(place, None if target is None else target.position)
 
-    def _around(self, target: State, measured: Motion, neighbours: Array) -> Aim:
+    def _around(self, now: int, target: State, measured: Motion, mates: Mates, sight: Sight) -> Aim:
         """Return the aim on the surface around the target's position at the end of the horizon."""
         ahead, rate, surface = self._lookahead_s, self._config.turn_rate, self._surface
         here = measured.position - target.position
-        turn, apart = self._turn(here, neighbours - target.position)
+        turn, apart = self._turn(here, mates.positions - target.position)
+        along = self._perception
+        if along is not None:
+            turn = along.turn(now, target.position, here, surface.nearest(here), mates, sight)
         first = surface.nearest(turned(here, turn) if turn else here)
 
         def around(positions: Array, velocities: Array, seconds: Array) -> Path:
@@ -183,7 +193,9 @@ class Goals:
                 offsets = surface.nearest(np.array([turned(first, rate * after) for after in seconds]))
                 across = np.stack([-offsets[:, 1], offsets[:, 0], np.zeros(len(seconds))], axis=1)
                 velocities = velocities + rate * across
-            if turn:
+            if along is not None:
+                offsets = np.array([along.standoff(offset, target.sigma) for offset in offsets])
+            elif turn:
                 offsets = np.array([outside(offset, turn) for offset in offsets])
             return Path(positions + offsets, velocities)
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
+from companion.config.formation import Perception
 from companion.estimation.estimator import Measured, Six
 from companion.estimation.tracks import State, Track, measured
 from companion.obstacles.alignment import align, extrapolate, within
@@ -26,6 +27,7 @@ from companion.obstacles.shared_plans import SharedPlans
 from companion.obstacles.trusted_peers import TrustedPeers, follows
 from companion.obstacles.uncertainty import ReportedUncertainty
 from companion.values.horizon import Array
+from companion.values.mates import Mates
 from companion.values.obstacles import Obstacles
 from companion.values.vectors import limit
 from mavlink_bridge.errors import PlanWireError
@@ -112,6 +114,8 @@ class Neighbours:
         self.closest = inf
         """m: least distance to a neighbour so far, by its messages; updated if ``guard.near`` is set."""
         self._brief = False
+        # Committed plans are received by the certified avoidance alone.
+        self._sees_no_plans = config.avoidance == "certified" and isinstance(config.formation, Perception)
         # Moving obstacles: they may be larger than a vehicle and are not bound by its limits.
         self._moving_obstacles = {one.system for one in config.moving}
         self.relevance = RelevanceFilter(config)
@@ -319,18 +323,19 @@ class Neighbours:
         """Number of vehicles received so far whose system id is smaller than the own."""
         return sum(system < self._system for system in self._ids if system not in self._moving_obstacles)
 
-    def mates(self, now: int) -> Array:
-        """Return the positions (M, 3), m, of the vehicles that fly by plans of their own.
+    def mates(self, now: int) -> Mates:
+        """Return the vehicles that fly by plans of their own.
 
         These are the ones with a fresh plan.
         """
         self._update_rows()
         if not self._ids:
-            return np.empty((0, 3))
+            return Mates()
         fresh = self._planning(now)
         age = np.minimum(np.maximum(now - self._times[fresh], 0), self._config.neighbour.extrapolate_us)
         states = self._states[fresh]
-        return np.asarray(states[:, 0:3] + 1e-6 * age[:, None] * states[:, 3:6])
+        ids = tuple(compress(self._ids, fresh.tolist()))
+        return Mates(ids, np.asarray(states[:, 0:3] + 1e-6 * age[:, None] * states[:, 3:6]))
 
     def mate_ids(self, now: int) -> frozenset[int]:
         """Return the system ids of the vehicles that fly by plans of their own."""
@@ -339,7 +344,13 @@ class Neighbours:
 
     def _planning(self, now: int) -> NDArray[np.bool_]:
         """Return, for each neighbour, whether it flies by plans of its own."""
-        _, fresh = self._table.positions(self._ids, now, now - self._config.guard.plan_stale_us)
+        stale = self._config.guard.plan_stale_us
+        if self._sees_no_plans:
+            # A companion that reports a fresh position counts as flying by plans.
+            fresh = np.array([not self._senders[system].by_autopilot for system in self._ids])
+            fresh &= now - self._times <= stale
+        else:
+            _, fresh = self._table.positions(self._ids, now, now - stale)
         for system in self._moving_obstacles & self._rows.keys():
             fresh[self._rows[system]] = False
         return fresh

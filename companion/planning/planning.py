@@ -15,6 +15,7 @@ from companion.goals.goals import Goals
 from companion.goals.heading import Heading, Yaw
 from companion.planning.avoidance import Avoidance, AvoidanceInputs
 from companion.values.horizon import Array, Motion
+from companion.values.mates import Mates
 from companion.values.obstacles import Obstacles
 from companion.values.phase import Phase
 from companion.values.stance import Stance
@@ -24,8 +25,7 @@ from mavlink_bridge.frames import LocalFrame
 
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
-_NO_POSITIONS = np.empty((0, 3))
-_NO_POSITIONS.flags.writeable = False
+_NO_MATES = Mates()
 _NO_OBSTACLES = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
 
 
@@ -113,7 +113,7 @@ class Planning:
             here = np.broadcast_to(measured.position, (self._config.horizon.steps + 1, 3))
             obstacles = self._world.obstacles(now, view, here)
         try:
-            mates = self._world.neighbours.mates(now) if self._config.shares_surface else _NO_POSITIONS
+            mates = self._world.neighbours.mates(now) if self._config.shares_surface else _NO_MATES
             below = self._world.neighbours.below if self._config.guard.return_step else 0
             aim = self._goals.aim(now, view, measured, obstacles, mates, below, cautious=cautious)
         except SurfaceError:
