@@ -237,9 +237,9 @@ class CertifiedFlight:
         if horizon is None:
             return
         difference = horizon.at(now).position - measured.position
-        certified, current = self._config.certified, self.commitment.current
+        certified, plan = self._config.certified, self.commitment.of(now)
         within = certified.tube
-        if current is not None and current.column:
+        if plan is not None and plan.column:
             difference[2], within = 0.0, max(certified.tube, certified.drift)
         self.deviation = float(np.sqrt(difference @ difference))
         self.largest_deviation = max(self.largest_deviation, self.deviation)

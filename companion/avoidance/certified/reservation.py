@@ -10,7 +10,7 @@ an own plan in space. From the second epoch after that on, the plans that the ot
 
 from __future__ import annotations
 
-from math import hypot
+from math import hypot, inf
 
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.commitment import Commitment
@@ -38,23 +38,25 @@ class Reservation:
         self._parks_within = beside
         self._joins_within = _MOVED * max(config.drift, config.tube)
         self._since: int | None = None
+        self._in_the_way: set[int] = set()
         self.joined = False
 
     def begin(self, now: int, place: Array, *, joins: bool) -> None:
         """Begin a new column at ``place`` (3,), m, of a vehicle on the ground, unless it still stands there.
 
         ``joins``: the vehicle is to take off. It does not join where a known plan is too near for an
-        agreement, because the other vehicle could then make no plan either.
+        agreement, because the other vehicle could then make no plan either. While it waits for that it keeps
+        its column, as a parked vehicle does: a column that is begun anew is announced an epoch later.
         """
         commitment, agreements = self._commitment, self._agreements
-        newest = commitment.announced()
-        within = self._parks_within
-        if joins:
-            within = self._joins_within if self.joined else _STANDS_M
-        if newest is not None and commitment.column:
-            x, y, _ = place - newest.position_m
-            within -= hypot(x, y)
-        if newest is None or not commitment.column or within < 0.0:
+        off = self._off(place)
+        within = self._joins_within if self.joined and joins else self._parks_within
+        column = None
+        self._in_the_way = set()
+        if joins and not self.joined and _STANDS_M < off <= within:
+            column = commitment.column_at(now, place)
+            self._in_the_way = agreements.near(column=column)
+        if off > within or (column is not None and not self._in_the_way):
             agreements.begin(commitment.begin(now, place, column=True))
             self._since = None
         newest = commitment.announced()
@@ -62,9 +64,17 @@ class Reservation:
             agreements.made(newest)
         if self.joined and (not joins or (agreements.unreserved() and agreements.near())):
             self.joined, self._since = False, None
-        elif joins and not self.joined and not agreements.near():
+        elif joins and not self.joined and not (self._in_the_way or agreements.near()):
             agreements.rejoin()
             self.joined = True
+
+    def _off(self, place: Array) -> float:
+        """Return how far (m) ``place`` (3,) is from the axis of the own column; ∞ without a column."""
+        newest = self._commitment.announced()
+        if newest is None or not newest.column:
+            return inf
+        x, y, _ = place - newest.position_m
+        return hypot(x, y)
 
     def has_room(self) -> bool:
         """Return whether a vehicle in the air may make its plan a column, or let it be one.
@@ -85,21 +95,24 @@ class Reservation:
         elif self._since is None:
             self._since = now
 
-    def reserved(self, now: int) -> bool:
-        """Return whether the plans that others fly at ``now`` (µs) keep clear of the column."""
-        # A statement that was received since the last ``watch`` may have taken an agreement back.
-        if self._since is None or not self._commitment.column or self._agreements.unreserved():
+    def _lasts(self, now: int) -> bool:
+        """Return whether at the last ``watch`` nothing had been missing for long enough at ``now`` (µs).
+
+        A statement that was received since may have taken an agreement back.
+        """
+        if self._since is None or not self._commitment.column:
             return False
         return now >= self._commitment.epoch(self._since) + 2 * self._config.epoch_us
 
     def missing(self, now: int) -> str:
         """Return what the autopilot must wait for at ``now`` (µs), or an empty string."""
-        if self.reserved(now):
-            horizon = self._commitment.horizon()
-            return "" if horizon is None or now >= rest_time(horizon) else "the end of its plan"
         if not self._commitment.column:
             return "its column"
-        near, unreserved = self._agreements.near(), self._agreements.unreserved()
+        unreserved = self._agreements.unreserved()
+        if self._lasts(now) and not unreserved:
+            horizon = self._commitment.horizon()
+            return "" if horizon is None or now >= rest_time(horizon) else "the end of its plan"
+        near = self._in_the_way | self._agreements.near()
         if near:
             return f"room for its column: the plan of {_listed(near)} is too near"
         return f"the agreement of {_listed(unreserved)} on its column" if unreserved else "its column"
