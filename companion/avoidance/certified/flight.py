@@ -152,6 +152,14 @@ class CertifiedFlight:
             self._hold_column(now)
         return room
 
+    def descend(self, now: int) -> None:
+        """Make the last plan a column, carried on: the autopilot lands the vehicle, reserved or not.
+
+        Without a reservation others may be above or below; from now on they keep what a column needs.
+        """
+        if self.commitment.turn(now) and not self.commitment.column:
+            self.commitment.raise_column()
+
     def leave_column(self, now: int, measured: Motion, *, flies: bool) -> None:
         """Make the column a plan in space again, at the height of the vehicle.
 
