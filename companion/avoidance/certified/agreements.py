@@ -281,6 +281,12 @@ class Agreements:
         own = newest._replace(plan=newest.plan._replace(column=True))
         return {system for system, plan in plans.items() if not self._negotiation.clear(own, plan)}
 
+    def clear(self, systems: set[int]) -> bool:
+        """Return whether the newest plans of ``systems`` are known, and far enough from the own column."""
+        known = {system: peer.plans.newest for system, peer in self._peers.items() if system in systems}
+        plans = {system: plan for system, plan in known.items() if plan is not None}
+        return plans.keys() == systems and not self.near(plans)
+
     def outdated(self, now: int, epoch: int) -> bool:
         """Return whether an agreement on the plans of ``epoch`` (µs) may soon replace an older one.
 

@@ -164,12 +164,12 @@ class CertifiedFlight:
         """Make the column a plan in space again, at the height of the vehicle.
 
         That is once the autopilot reports that it ``flies``, neither takes off nor lands, the vehicle is
-        within its tube, and each member has an agreement.
+        within its tube, and each member has an agreement, or cannot meet it (``Reservation.may_be_left``).
         """
         commitment = self.commitment
         self._hover(measured.position[2])
         horizon = commitment.horizon()
-        if self._hold_column(now) and horizon is not None and flies and not self.agreements.missing():
+        if self._hold_column(now) and horizon is not None and flies and self.reservation.may_be_left():
             off = horizon.at(now).position - measured.position
             inside = float(off @ off) <= self._config.certified.tube**2
             if inside and now >= rest_time(horizon):

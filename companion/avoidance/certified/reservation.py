@@ -39,6 +39,7 @@ class Reservation:
         self._joins_within = _MOVED * max(config.drift, config.tube)
         self._since: int | None = None
         self._in_the_way: set[int] = set()
+        self._was_reserved = False
         self.joined = False
 
     def begin(self, now: int, place: Array, *, joins: bool) -> None:
@@ -58,7 +59,7 @@ class Reservation:
             self._in_the_way = agreements.near(column=column)
         if off > within or (column is not None and not self._in_the_way):
             agreements.begin(commitment.begin(now, place, column=True))
-            self._since = None
+            self._since, self._was_reserved = None, False
         newest = commitment.announced()
         if newest is not None:
             agreements.made(newest)
@@ -89,11 +90,21 @@ class Reservation:
 
     def watch(self, now: int) -> None:
         """Note since when (µs) nothing is missing for the reservation of the newest plan, a column."""
-        commitment = self._commitment
-        if not commitment.column or self._agreements.unreserved():
+        column = self._commitment.column
+        if not column or self._agreements.unreserved():
             self._since = None
         elif self._since is None:
             self._since = now
+        self._was_reserved = column and (self._was_reserved or self._lasts(now))
+
+    def may_be_left(self) -> bool:
+        """Return whether the column may become a plan in space, as far as the members are concerned.
+
+        That is where no agreement is missing. A vehicle that has begun anew since the column was reserved
+        was kept away from it by its plan before. It need not agree again, if its newest plan is away as well.
+        """
+        missing = self._agreements.missing()
+        return not missing or (self._was_reserved and self._agreements.clear(missing))
 
     def _lasts(self, now: int) -> bool:
         """Return whether at the last ``watch`` nothing had been missing for long enough at ``now`` (µs).

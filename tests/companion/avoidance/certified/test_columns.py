@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from companion.avoidance.certified import constraint_sources
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.columns import Distances
+from companion.avoidance.certified.committed import resting
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.negotiation import Negotiation
 from companion.avoidance.certified.reservation import Reservation
@@ -25,9 +26,9 @@ from mavlink_bridge.messages import Source
 from mavlink_bridge.wire.agreements import Statement, unpack
 from mavlink_bridge.wire.plan import pack
 from tests.companion.avoidance.certified.draws import delays, losses
-from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import FLEET, NEVER, Habits, Rough, Swarm, Vehicle
-from tests.companion.avoidance.certified.two import LENGTH, NOW, OTHER, OWN, agreed, leaving, plan
+from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
+from tests.companion.avoidance.certified.swarm import CLIMB, FLEET, NEVER, Habits, Rough, Swarm, Vehicle
+from tests.companion.avoidance.certified.two import LENGTH, NOW, OTHER, OWN, agreed, agreements, leaving, plan
 
 UNTIL = 6_000_000
 """µs of a run."""
@@ -146,6 +147,62 @@ def test_who_hears_nothing_of_an_expected_vehicle_does_not_climb() -> None:
     assert not vehicle.columns
     assert vehicle.flight.reservation.missing(0) == "the agreement of 3 on its column"
     assert not swarm.faults()
+
+
+def test_a_silent_vehicle_that_cannot_meet_the_column_does_not_keep_it_from_becoming_a_plan_in_space() -> (
+    None
+):
+    """It begins anew while the other climbs, is heard once more, and then never again."""
+    begins = 900_000
+    habits = [Habits(takes_off=0), Habits(), Habits(restarts=begins, frozen=((begins + 100_000, NEVER),))]
+    swarm = fly(habits, Rough(), 1, 4_000_000)
+    ((climbs, left),) = swarm.vehicles[0].columns
+    assert climbs < begins < climbs + CLIMB
+    assert swarm.vehicles[0].flight.agreements.missing() == {3}
+    assert left < climbs + CLIMB + 3 * LENGTH
+    assert not swarm.faults()
+
+
+@FLIGHTS
+@given(st.integers(0, 2**16), losses, delays)
+def test_plans_are_apart_if_another_begins_anew_during_the_climb(seed: int, loss: float, delay: int) -> None:
+    """It rests when its companion restarts; afterwards both wander, and it may be silent for ever."""
+    rng = np.random.default_rng(seed)
+    begins = int(rng.integers(300_000, 2_000_000))
+    silent = ((begins + int(rng.integers(20_000, 400_000)), NEVER),) if rng.random() < 0.5 else ()
+    row, wander = places(2, seed), wandering(2, seed)
+    swarm = Swarm(
+        row, Rough(loss, delay, 0.2), [Habits(takes_off=0), Habits(restarts=begins, frozen=silent)], seed
+    )
+    swarm.run(UNTIL, lambda since, system: row[system - 1] if since < begins else wander(since, system))
+    assert not swarm.faults()
+
+
+@pytest.mark.parametrize(("x", "clear"), [(1.2, False), (4.0, True), (None, False)])
+def test_who_can_meet_a_column_is_near_or_unknown(x: float | None, clear: bool) -> None:
+    """The plan of the other is a column, too: 1.5 m are needed."""
+    one = agreements(OWN, OWN, OTHER)
+    one.made(plan()._replace(column=True))
+    if x is not None:
+        one.receive_plan(NOW, OTHER, pack(plan(x=x)._replace(column=True)))
+    assert one.missing() == {OTHER}
+    assert one.clear({OTHER}) is clear
+
+
+def test_a_column_that_was_never_reserved_waits_for_all_agreements() -> None:
+    """Another controller took the vehicle off: planes may be kept that are not upright."""
+    for reserved in (False, True):
+        flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+        stands = Motion(np.zeros(3), np.zeros(3), np.zeros(3))
+        for now in range(EPOCH, EPOCH + 4 * LENGTH, LENGTH):
+            if reserved:
+                flight.park(now, stands, joins=True)
+            else:
+                flight.reservation.begin(now, stands.position, joins=True)
+        far = resting(now, DT, STEPS, (9.0, 0.0, 0.0), FLEET.fingerprint)
+        flight.agreements.receive_plan(now, OTHER, pack(far))
+        assert flight.agreements.missing() == {OTHER}
+        assert flight.reservation.may_be_left() is reserved
 
 
 def test_who_does_not_take_off_is_passed_and_is_not_waited_for() -> None:
