@@ -9,10 +9,11 @@ the plan's end and for ``certified.backup_hover_us`` of hover; then the autopilo
 companion that returns continues the same plan.
 
 The backup node continues only a plan that is known to be flown: the companion's last set-point must agree
-with the plan that the backup node holds, by its own clock and in its own local frame. The backup node must
-start before the companion steers; otherwise it waits for the next plan. It adds to the plan what the
-companion adds (``plan_feedforward``, ``sent_compensation``). The companion's command to land, its farewell,
-another mode, a disarmed vehicle or three seconds without a heartbeat discard all plans.
+with the plan that the backup node holds, by its own clock and in its own local frame. A column is continued
+at the height of that set-point, and only the horizontal distance counts. The backup node must start before
+the companion steers; otherwise it waits for the next plan. It adds to the plan what the companion adds
+(``plan_feedforward``, ``sent_compensation``). The companion's command to land, its farewell, another mode, a
+disarmed vehicle or three seconds without a heartbeat discard all plans.
 """
 
 from __future__ import annotations
@@ -125,8 +126,9 @@ class BackupNode:
         self._codecs = {link: Codec(accepts(link, system), signing) for link in LINKS}
         self._signing = signing
         self._plans: dict[int, WirePlan] = {}
-        self._cached_horizon: tuple[WirePlan, Horizon] | None = None
+        self._cached_horizon: tuple[WirePlan, float | None, Horizon] | None = None
         self._received: tuple[int, SetpointLocal] | None = None
+        self._height: float | None = None
         self._beat: tuple[int, Heartbeat] | None = None
         self._compensation, self._feedforward = SentCompensation(), PlanFeedforward()
         self._local: LocalFrame | None = None
@@ -300,19 +302,31 @@ class BackupNode:
         self._plans = {epoch: kept for epoch, kept in self._plans.items() if epoch >= oldest}
 
     def _horizon(self, now: int) -> Horizon | None:
-        """Return the committed plan at ``now`` (µs): the newest that has begun; None without one."""
+        """Return the committed plan at ``now`` (µs): the newest that has begun; None without one.
+
+        A column is at the height (m) of the companion's last set-point, if that is not the plan's.
+        """
         epoch = max((epoch for epoch in self._plans if epoch <= now), default=None)
         if epoch is None:
             return None
-        plan = self._plans[epoch]
-        if self._cached_horizon is None or self._cached_horizon[0] is not plan:
-            self._cached_horizon = plan, horizon_of(plan)
-        return self._cached_horizon[1]
+        plan, height = self._plans[epoch], self._height
+        if not plan.column or height is None or abs(height - plan.position_m[2]) <= _MAX_DEVIATION_M:
+            height = None
+        known = self._cached_horizon
+        if known is None or known[0] is not plan or known[1] != height:
+            horizon = horizon_of(plan)
+            if height is not None:
+                horizon.knots[:, 2], horizon.knots[:, 5::3] = height, 0.0
+            known = self._cached_horizon = plan, height, horizon
+        return known[2]
 
     def _agrees(self, now: int, message: SetpointLocal) -> bool:
         """Return whether the companion's set-point agrees with the stored plan; False without a plan."""
+        if self._local is None:
+            return False
+        self._height = float(self._local.position_to_fleet(message.position)[2])
         horizon = self._horizon(now)
-        if horizon is None or self._local is None:
+        if horizon is None:
             return False
         planned = self._local.position_to_local(horizon.at(now + self._config.setpoint_lead_us).position)
         off = planned - np.array(message.position)

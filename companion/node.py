@@ -88,7 +88,7 @@ class Companion:
         else:
             parts, clock = VehicleParts(config, own, fleet, world, pilot, times), self._fleet_clock
             self.avoidance = CertifiedAvoidance(parts) if clock is None else FleetTimeAvoidance(parts, clock)
-        self._goals = Goals(config, system, pilot, self.avoidance.lookahead_s)
+        self._goals = Goals(config, system, pilot, self.avoidance.lookahead_s, target_system)
         self._orders = Orders(config, own, fleet, pilot, self._goals)
         self._planning = Planning(config, world, pilot, self._goals, self.avoidance)
         self._setpoints = Setpoints(config, own, pilot, self.avoidance, self._planning)

@@ -116,7 +116,7 @@ class CertifiedConfig(Settings):
     drift: Positive = Field(
         0.5,
         description="m, largest horizontal distance from its column's axis of a vehicle that its autopilot"
-        " takes off or lands",
+        " takes off or lands; the default is for calm air, wind needs more",
     )
     sigmas: float = Field(3.0, ge=0.0, le=6.0, description="k of k·σ of the position estimate")
     clock_us: int = Field(5_000, ge=0, le=100_000, description="µs that a clock may differ from fleet time")

@@ -24,7 +24,7 @@ class GuardConfig(Settings):
         description="µs: a go that has not armed the vehicle by then is cancelled",
     )
     landing_speed: Positive = Field(0.3, description="m/s; slower than this a vehicle may land")
-    landing_clearance: Positive = Field(1.0, description="m, horizontally to the nearest neighbour, to land")
+    landing_clearance: Positive = Field(1.0, description="m, horizontally to the nearest obstacle, to land")
     settle_us: int = Field(
         30_000_000, ge=0, le=600_000_000, description="µs: after this long the vehicle lands without settling"
     )

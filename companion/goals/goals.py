@@ -71,11 +71,14 @@ class Goals:
     """Destinations of the vehicle of ``system``.
 
     ``pilot`` gives the phase, and receives a report when the vehicle is back and when it has settled.
-    ``lookahead_s``: time (s) from now to the end of a plan.
+    ``lookahead_s``: time (s) from now to the end of a plan. ``target_system``: system id of the target.
     """
 
-    def __init__(self, config: CompanionConfig, system: int, pilot: Flight, lookahead_s: float) -> None:
+    def __init__(
+        self, config: CompanionConfig, system: int, pilot: Flight, lookahead_s: float, target_system: int
+    ) -> None:
         self._config = config
+        self._unshared = {target_system, *(one.system for one in config.moving)}
         self._pilot = pilot
         self._lookahead_s = lookahead_s
         self._surface = config.surface_of(system)
@@ -85,7 +88,7 @@ class Goals:
             if isinstance(formation, Perception)
             else None
         )
-        self._settling = Settling(config)
+        self._settling = Settling(config, self._unshared)
         self._phase: Phase | None = None
         self._held: Array | None = None
         self._began: Array | None = None
@@ -112,7 +115,7 @@ class Goals:
         if phase is not self._phase:
             self._phase, self._held = phase, None
             limits = self._pilot.planned_limits
-            self._settling = Settling(self._config.model_copy(update={"limits": limits}))
+            self._settling = Settling(self._config.model_copy(update={"limits": limits}), self._unshared)
             self._nearest = inf
         elif phase is Phase.ESCORT and self._config.task == "escort" and view.target is not None:
             self._held = None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
-from companion.avoidance.certified.margins import between, further
+from companion.avoidance.certified.margins import between, further, margin
 from companion.config import CompanionConfig
+from companion.obstacles.static import FIRST_ID
 from companion.values.horizon import Array, Motion
 from companion.values.obstacles import Obstacles
 
@@ -22,14 +25,17 @@ class Settling:
 
     ``clear``: whether no obstacle was near horizontally when ``rest`` was last called with a speed below
     ``guard.landing_speed``. Heights do not count, because landing is straight down. Near is within
-    ``guard.landing_clearance``, and with committed plans within the distance of two columns.
+    ``guard.landing_clearance`` of a surface. With committed plans it is also within the distance of two
+    columns from a vehicle, and within what a column keeps from the surface of anything that flies no
+    committed plan: posts, what is sensed, and the systems of ``unshared`` (the target, moving obstacles).
     """
 
-    def __init__(self, config: CompanionConfig) -> None:
-        self._config = config
-        self._clearance = config.guard.landing_clearance
+    def __init__(self, config: CompanionConfig, unshared: Collection[int] = ()) -> None:
+        self._config, self._unshared = config, unshared
+        self._from_vehicles = self._from_others = config.guard.landing_clearance
         if config.avoidance == "certified":
-            self._clearance = max(self._clearance, between_columns(config))
+            self._from_vehicles = max(self._from_vehicles, between_columns(config))
+            self._from_others = max(self._from_others, beside_column(config))
         self._rest: Array | None = None
         self._waiting_since: int | None = None
         self.clear = False
@@ -48,21 +54,27 @@ class Settling:
             low, high = np.minimum(config.limits.box_min, here), np.maximum(config.limits.box_max, here)
             self._rest = np.clip(here + reach * measured.velocity, low, high)
         if speed < config.guard.landing_speed:
-            nearest = self._in_the_way(here, obstacles)
+            clearances = self._clearances(obstacles)
+            nearest = self._in_the_way(here, obstacles, clearances)
             self.clear = nearest is None
             if nearest is None:
                 self._waiting_since = None
             elif not self._waits(now, obstacles.positions[nearest]):
                 radius = float(np.broadcast_to(obstacles.radius, len(obstacles.ids))[nearest])
-                self._rest = self._beside(here, obstacles.positions[nearest, 0], radius)
+                distance = radius + clearances[nearest] + _EXTRA_CLEARANCE_M
+                self._rest = self._beside(here, obstacles.positions[nearest, 0], distance)
         return self._rest
 
-    def _in_the_way(self, here: Array, obstacles: Obstacles) -> int | None:
-        """Return the index of the horizontally nearest obstacle; None without one within the clearance."""
+    def _clearances(self, obstacles: Obstacles) -> Array:
+        """Return within how many metres (M,) of the surface each obstacle is near."""
+        vehicles = [id_ < FIRST_ID and id_ not in self._unshared for id_ in obstacles.ids]
+        return np.where(vehicles, self._from_vehicles, self._from_others)
+
+    def _in_the_way(self, here: Array, obstacles: Obstacles, clearances: Array) -> int | None:
+        """Return the index of the obstacle that is nearest, compared with its clearance; None without one."""
         distance = np.linalg.norm(here[:2] - obstacles.positions[:, 0, :2], axis=1) - obstacles.radius
-        if distance.min(initial=np.inf) > self._clearance:
-            return None
-        return int(np.argmin(distance))
+        excess = distance - clearances
+        return None if excess.min(initial=np.inf) > 0.0 else int(np.argmin(excess))
 
     def _waits(self, now: int, positions: Array) -> bool:
         """Return whether an obstacle at ``positions`` (N + 1, 3) passes and may still be waited for."""
@@ -73,15 +85,20 @@ class Settling:
         self._waiting_since = now if self._waiting_since is None else self._waiting_since
         return now - self._waiting_since < _MAX_WAIT_US
 
-    def _beside(self, here: Array, centre: Array, radius: float) -> Array:
-        """Return a place (3,), m, at the present height, clear of an obstacle at ``centre`` (3,)."""
+    def _beside(self, here: Array, centre: Array, distance: float) -> Array:
+        """Return a place (3,), m, at the present height, at a ``distance`` (m) from ``centre`` (3,)."""
         offset = here[:2] - centre[:2]
         length = float(np.hypot(offset[0], offset[1]))
         away = offset / length if length > _MIN_DISTANCE_M else _EAST
-        distance = radius + self._clearance + _EXTRA_CLEARANCE_M
         return np.append(centre[:2] + distance * away, here[2])
 
 
 def between_columns(config: CompanionConfig) -> float:
     """Return the least distance (m) between two columns."""
     return between(config.certified, config.field, config.limits) + 2.0 * further(config.certified)
+
+
+def beside_column(config: CompanionConfig) -> float:
+    """Return the least distance (m) of a column from a surface that flies no committed plan."""
+    own = margin(config.certified, config.field, config.limits)
+    return config.field.d_min + own + further(config.certified)

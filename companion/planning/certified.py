@@ -198,7 +198,12 @@ class CertifiedAvoidance:
         return True
 
     def messages(self, now: int, *, farewell: bool) -> list[Message]:
-        """Return the announcements of the committed plan and the requests for the others' clocks."""
+        """Return the announcements of the committed plan and the requests for the others' clocks.
+
+        A ``farewell`` of a vehicle that does not fly its last plan to the end is that of a landing.
+        """
+        if farewell and not self._finishing:
+            self._flight.descend(now)
         return self._flight.messages(now, farewell=farewell)
 
     def shared(self, now: int, view: View) -> Horizon | None:

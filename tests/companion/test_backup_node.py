@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.agreements import Agreements
-from companion.avoidance.certified.committed import carried_on, committed, horizon_of
+from companion.avoidance.certified.committed import carried_on, committed, horizon_of, resting
 from companion.avoidance.certified.fingerprint import fingerprint, identity
 from companion.avoidance.certified.negotiation import Geometry
 from companion.backup_node import BackupNode
@@ -39,6 +39,7 @@ from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack, quantise
+from mavlink_bridge.wire.plan import unpack as unpack_plan
 from mavlink_bridge.wire.signing import Signing
 
 SYSTEM = 11
@@ -69,6 +70,8 @@ class Bench:
         self.ahead = 0
         """µs by which the companion's clock is ahead of the backup node's."""
         self.plans = [plan_from(BEGIN)]
+        self.height: float | None = None
+        """Height (m) of the companion's set-points; None: that of the plan."""
         self.sent: list[tuple[int, SetpointLocal]] = []
 
     def run(self, seconds: float) -> list[tuple[int, SetpointLocal]]:
@@ -109,6 +112,8 @@ class Bench:
         now = self.now + self.ahead
         plan = max((p for p in self.plans if p.epoch <= now), default=plan_from(BEGIN), key=lambda p: p.epoch)
         place = horizon_of(plan).at(now + CONFIG.setpoint_lead_us).position
+        if self.height is not None:
+            place[2] = self.height
         ned, zero = (float(place[1]), float(place[0]), -float(place[2])), (0.0, 0.0, 0.0)
         return SetpointLocal(COMPANION, self.now - BEGIN, SYSTEM, 1, 1, 0, ned, zero, zero, YAW, 0.0)
 
@@ -128,6 +133,48 @@ def silent(bench: Bench) -> Bench:
     assert bench.run(1.0) == []
     bench.speaks = False
     return bench
+
+
+def hovering(column: bool) -> Bench:
+    """The companion hovers over its place, at another height than its plan."""
+    bench = Bench()
+    plan = resting(BEGIN, DT, STEPS, (1.0, 2.0, 0.1), FLEET.fingerprint, column=column)
+    bench.plans = [plan, plan._replace(epoch=BEGIN + 200_000)]
+    bench.height = 5.0
+    return silent(bench)
+
+
+def test_a_column_goes_on_at_the_height_of_the_last_set_point() -> None:
+    """After a climb the plan is a column of the ground's height, until it becomes a plan in space."""
+    bench = hovering(column=True)
+    sent = bench.run(2.0)
+    assert len(sent) > 80
+    for _, message in sent:
+        np.testing.assert_allclose(message.position, (2.0, 1.0, -5.0), atol=1e-4)
+        np.testing.assert_allclose(message.velocity, 0.0, atol=1e-6)
+    assert [unpack_plan(one.payload).column for one in bench.node.farewell(bench.now)[:1]] == [True]
+
+
+@pytest.mark.parametrize(("column", "height"), [(False, 5.0), (True, float("nan"))])
+def test_a_set_point_at_another_height_agrees_with_no_plan_in_space_and_a_nan_with_none(
+    column: bool, height: float
+) -> None:
+    bench = hovering(column)
+    bench.speaks, bench.height = True, height
+    bench.run(0.1)
+    bench.speaks = False
+    assert bench.run(2.0) == []
+    assert bench.node.farewell(bench.now) == []
+
+
+def test_a_column_that_becomes_a_plan_in_space_is_flown_at_the_plans_height() -> None:
+    bench = hovering(column=True)
+    begins = bench.now + 100_000 - bench.now % 200_000 + 200_000
+    bench.plans = [resting(begins, DT, STEPS, (1.0, 2.0, 5.2), FLEET.fingerprint)]
+    for plan in bench.plans:
+        bench.node.step(bench.now, [bench.tell("swarm", told(plan))])
+    bench.run(0.6)
+    assert -bench.sent[-1][1].position[2] == pytest.approx(5.2, abs=1e-4)
 
 
 def test_while_the_companion_speaks_it_is_silent() -> None:

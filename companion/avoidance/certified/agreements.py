@@ -225,8 +225,8 @@ class Agreements:
 
     @property
     def columns(self) -> frozenset[int]:
-        """Systems whose newest plan is a column."""
-        newest = ((system, peer.plans.newest) for system, peer in self._peers.items())
+        """Systems whose newest plan is a column, without those that said farewell: they make no other."""
+        newest = ((s, peer.plans.newest) for s, peer in self._peers.items() if peer.left is None)
         return frozenset(system for system, plan in newest if plan is not None and plan.plan.column)
 
     @property
@@ -267,12 +267,12 @@ class Agreements:
         own = self._plans.get(one.own)
         return own is not None and own.plan.column
 
-    def near(self, plans: dict[int, StoredPlan] | None = None) -> set[int]:
-        """Return the systems of which one of the ``plans`` is too near for an agreement with the own column.
+    def near(self, plans: dict[int, StoredPlan] | None = None, column: WirePlan | None = None) -> set[int]:
+        """Return the systems of which one of the ``plans`` is too near for an agreement with a ``column``.
 
-        The column is that of the own newest plan. Without ``plans``: the newest that are known.
+        Without ``column``: that of the own newest plan. Without ``plans``: the newest that are known.
         """
-        newest = self._plans.newest
+        newest = self._plans.newest if column is None else stored(column)
         if plans is None:
             known = {system: peer.left or peer.plans.newest for system, peer in self._peers.items()}
             plans = {system: plan for system, plan in known.items() if plan is not None}
@@ -280,6 +280,12 @@ class Agreements:
             return set()
         own = newest._replace(plan=newest.plan._replace(column=True))
         return {system for system, plan in plans.items() if not self._negotiation.clear(own, plan)}
+
+    def clear(self, systems: set[int]) -> bool:
+        """Return whether the newest plans of ``systems`` are known, and far enough from the own column."""
+        known = {system: peer.plans.newest for system, peer in self._peers.items() if system in systems}
+        plans = {system: plan for system, plan in known.items() if plan is not None}
+        return plans.keys() == systems and not self.near(plans)
 
     def outdated(self, now: int, epoch: int) -> bool:
         """Return whether an agreement on the plans of ``epoch`` (µs) may soon replace an older one.

@@ -92,6 +92,11 @@ class Commitment:
         self.following = self.current._replace(epoch=free)
         return free
 
+    def column_at(self, now: int, place: Array) -> WirePlan:
+        """Return the column at ``place`` (3,), m, that ``begin`` would begin at ``now`` (µs)."""
+        epoch, steps = self.epoch(now), self._program.n
+        return resting(epoch, self._config.dt_us, steps, place, self._origin, column=True)
+
     def turn(self, now: int) -> bool:
         """Advance to the epoch that holds ``now`` (µs); return whether its following plan is to be made."""
         epoch = self.epoch(now)
@@ -103,6 +108,11 @@ class Commitment:
             # No plan was announced in the meantime, so no vehicle can rely on a newer plan.
             self.current = carried_on(self.current, (epoch - self.current.epoch) // self.current.dt)
         return self.current is not None and self.following is None
+
+    def of(self, now: int) -> WirePlan | None:
+        """Return the plan of the epoch that holds ``now`` (µs), also before ``turn`` is called in it."""
+        following = self.following
+        return self.current if following is None or now < following.epoch else following
 
     @property
     def unannounced(self) -> bool:

@@ -152,16 +152,24 @@ class CertifiedFlight:
             self._hold_column(now)
         return room
 
+    def descend(self, now: int) -> None:
+        """Make the last plan a column, carried on: the autopilot lands the vehicle, reserved or not.
+
+        Without a reservation others may be above or below; from now on they keep what a column needs.
+        """
+        if self.commitment.turn(now) and not self.commitment.column:
+            self.commitment.raise_column()
+
     def leave_column(self, now: int, measured: Motion, *, flies: bool) -> None:
         """Make the column a plan in space again, at the height of the vehicle.
 
         That is once the autopilot reports that it ``flies``, neither takes off nor lands, the vehicle is
-        within its tube, and each member has an agreement.
+        within its tube, and each member has an agreement, or cannot meet it (``Reservation.may_be_left``).
         """
         commitment = self.commitment
         self._hover(measured.position[2])
         horizon = commitment.horizon()
-        if self._hold_column(now) and horizon is not None and flies and not self.agreements.missing():
+        if self._hold_column(now) and horizon is not None and flies and self.reservation.may_be_left():
             off = horizon.at(now).position - measured.position
             inside = float(off @ off) <= self._config.certified.tube**2
             if inside and now >= rest_time(horizon):
@@ -237,9 +245,9 @@ class CertifiedFlight:
         if horizon is None:
             return
         difference = horizon.at(now).position - measured.position
-        certified, current = self._config.certified, self.commitment.current
+        certified, plan = self._config.certified, self.commitment.of(now)
         within = certified.tube
-        if current is not None and current.column:
+        if plan is not None and plan.column:
             difference[2], within = 0.0, max(certified.tube, certified.drift)
         self.deviation = float(np.sqrt(difference @ difference))
         self.largest_deviation = max(self.largest_deviation, self.deviation)

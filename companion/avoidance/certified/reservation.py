@@ -10,7 +10,7 @@ an own plan in space. From the second epoch after that on, the plans that the ot
 
 from __future__ import annotations
 
-from math import hypot
+from math import hypot, inf
 
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.commitment import Commitment
@@ -38,33 +38,44 @@ class Reservation:
         self._parks_within = beside
         self._joins_within = _MOVED * max(config.drift, config.tube)
         self._since: int | None = None
+        self._in_the_way: set[int] = set()
+        self._was_reserved = False
         self.joined = False
 
     def begin(self, now: int, place: Array, *, joins: bool) -> None:
         """Begin a new column at ``place`` (3,), m, of a vehicle on the ground, unless it still stands there.
 
         ``joins``: the vehicle is to take off. It does not join where a known plan is too near for an
-        agreement, because the other vehicle could then make no plan either.
+        agreement, because the other vehicle could then make no plan either. While it waits for that it keeps
+        its column, as a parked vehicle does: a column that is begun anew is announced an epoch later.
         """
         commitment, agreements = self._commitment, self._agreements
-        newest = commitment.announced()
-        within = self._parks_within
-        if joins:
-            within = self._joins_within if self.joined else _STANDS_M
-        if newest is not None and commitment.column:
-            x, y, _ = place - newest.position_m
-            within -= hypot(x, y)
-        if newest is None or not commitment.column or within < 0.0:
+        off = self._off(place)
+        within = self._joins_within if self.joined and joins else self._parks_within
+        column = None
+        self._in_the_way = set()
+        if joins and not self.joined and _STANDS_M < off <= within:
+            column = commitment.column_at(now, place)
+            self._in_the_way = agreements.near(column=column)
+        if off > within or (column is not None and not self._in_the_way):
             agreements.begin(commitment.begin(now, place, column=True))
-            self._since = None
+            self._since, self._was_reserved = None, False
         newest = commitment.announced()
         if newest is not None:
             agreements.made(newest)
         if self.joined and (not joins or (agreements.unreserved() and agreements.near())):
             self.joined, self._since = False, None
-        elif joins and not self.joined and not agreements.near():
+        elif joins and not self.joined and not (self._in_the_way or agreements.near()):
             agreements.rejoin()
             self.joined = True
+
+    def _off(self, place: Array) -> float:
+        """Return how far (m) ``place`` (3,) is from the axis of the own column; ∞ without a column."""
+        newest = self._commitment.announced()
+        if newest is None or not newest.column:
+            return inf
+        x, y, _ = place - newest.position_m
+        return hypot(x, y)
 
     def has_room(self) -> bool:
         """Return whether a vehicle in the air may make its plan a column, or let it be one.
@@ -79,27 +90,40 @@ class Reservation:
 
     def watch(self, now: int) -> None:
         """Note since when (µs) nothing is missing for the reservation of the newest plan, a column."""
-        commitment = self._commitment
-        if not commitment.column or self._agreements.unreserved():
+        column = self._commitment.column
+        if not column or self._agreements.unreserved():
             self._since = None
         elif self._since is None:
             self._since = now
+        self._was_reserved = column and (self._was_reserved or self._lasts(now))
 
-    def reserved(self, now: int) -> bool:
-        """Return whether the plans that others fly at ``now`` (µs) keep clear of the column."""
-        # A statement that was received since the last ``watch`` may have taken an agreement back.
-        if self._since is None or not self._commitment.column or self._agreements.unreserved():
+    def may_be_left(self) -> bool:
+        """Return whether the column may become a plan in space, as far as the members are concerned.
+
+        That is where no agreement is missing. A vehicle that has begun anew since the column was reserved
+        was kept away from it by its plan before. It need not agree again, if its newest plan is away as well.
+        """
+        missing = self._agreements.missing()
+        return not missing or (self._was_reserved and self._agreements.clear(missing))
+
+    def _lasts(self, now: int) -> bool:
+        """Return whether at the last ``watch`` nothing had been missing for long enough at ``now`` (µs).
+
+        A statement that was received since may have taken an agreement back.
+        """
+        if self._since is None or not self._commitment.column:
             return False
         return now >= self._commitment.epoch(self._since) + 2 * self._config.epoch_us
 
     def missing(self, now: int) -> str:
         """Return what the autopilot must wait for at ``now`` (µs), or an empty string."""
-        if self.reserved(now):
-            horizon = self._commitment.horizon()
-            return "" if horizon is None or now >= rest_time(horizon) else "the end of its plan"
         if not self._commitment.column:
             return "its column"
-        near, unreserved = self._agreements.near(), self._agreements.unreserved()
+        unreserved = self._agreements.unreserved()
+        if self._lasts(now) and not unreserved:
+            horizon = self._commitment.horizon()
+            return "" if horizon is None or now >= rest_time(horizon) else "the end of its plan"
+        near = self._in_the_way | self._agreements.near()
         if near:
             return f"room for its column: the plan of {_listed(near)} is too near"
         return f"the agreement of {_listed(unreserved)} on its column" if unreserved else "its column"

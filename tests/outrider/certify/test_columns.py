@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mavlink_bridge.wire.agreements import Statement
+from mavlink_bridge.wire.agreements import Entry, Statement
 from mavlink_bridge.wire.plan import Integers, WirePlan
 from outrider.certify.evidence import Evidence, LoggedStatement, Order
 from outrider.certify.verdict import Verdict, judge
@@ -74,17 +74,78 @@ def test_a_climb_before_the_reservation_is_found() -> None:
     assert finding.who[0] == 11
 
 
-def test_a_climb_within_an_epoch_of_the_reservation_is_found() -> None:
-    """The others may still fly a plan that they made before."""
+def test_a_climb_without_a_whole_epoch_since_the_reservation_is_found() -> None:
+    """Reserved half an epoch before the first one: until its end the others may fly a plan made before."""
     whole = ordered(evidence({11: climbing(), 12: [on(BESIDE, k) for k in range(EPOCHS)]}, WIDE), 0)
     first, second = whole.logs
     (order,) = first.orders
     found = {}
-    for late in (EPOCH - 2_000, EPOCH):
-        moved = order._replace(time=order.time + late, number=order.number + 1)
+    for time in (at(0) + EPOCH // 2, at(1) - 1, at(1)):
+        moved = order._replace(time=time, number=order.number + 1)
         logs = first._replace(orders=(moved,)), second
-        found[late] = [one.figures for one in judge(whole._replace(logs=logs)).findings]
-    assert found == {EPOCH - 2_000: ["reserved for less than an epoch"], EPOCH: []}
+        found[time - at(0)] = [one.figures for one in judge(whole._replace(logs=logs)).findings]
+    late = ["reserved for less than an epoch"]
+    assert found == {EPOCH // 2: late, EPOCH - 1: late, EPOCH: []}
+
+
+def test_a_landing_before_the_column_rests_is_found() -> None:
+    """It brakes for seven epochs, reserved long before."""
+    moving = turned(standing((-1.5, 0.0, 5.0)), [(600, 0, 0), (600, 0, 0), (-600, 0, 0)])
+    own = [on(moving, k)._replace(column=True) for k in range(24)]
+    whole = evidence({11: own, 12: [on(BESIDE, k) for k in range(24)]}, WIDE)
+    (finding,) = judge(ordered(whole, 6, climbs=False)).findings
+    assert (finding.what, finding.figures) == ("a descent without a reservation", "its column does not rest")
+    assert judge(ordered(whole, 20, climbs=False)).findings == ()
+
+
+@pytest.mark.parametrize(("east", "found"), [(1.7, True), (1.9, False)])
+@pytest.mark.parametrize("height", [0.0, 40.0])
+def test_a_climb_beside_one_that_is_parked_too_near_is_found(east: float, found: bool, height: float) -> None:
+    """Its column adds 0.3 m, as the climbing one does."""
+    parked = standing((east, 0.0, height))._replace(column=True)
+
+    def farewell(one: LoggedStatement) -> Statement:
+        said = one.statement
+        if one.sender == 12:
+            answers = Entry(11, considered=(said.epoch, said.epoch))
+            return said._replace(entries=(answers,), farewell=True)
+        return said._replace(entries=(Entry(12, departed=True),))
+
+    whole = evidence({11: climbing(), 12: [on(parked, k) for k in range(EPOCHS)]}, WIDE)
+    verdict = judge(ordered(restated(whole, farewell), 3))
+    figures = [one.figures for one in verdict.findings if one.what == "a climb without a reservation"]
+    assert figures == (["the last plan of 12 is too near"] if found else [])
+
+
+@pytest.mark.parametrize(
+    ("begins", "place", "figures"),
+    [
+        (0, (3.0, 0.0, 5.0), "its column was not reserved"),
+        (4, (3.0, 0.0, 5.0), None),
+        (4, (1.4, 0.0, 5.0), "its plan is too near the column"),
+    ],
+)
+def test_a_column_may_be_left_beside_one_that_begins_anew_if_that_is_away(
+    begins: int, place: tuple[float, ...], figures: str | None
+) -> None:
+    """From the epoch ``begins`` on 12 has begun anew at ``place``, and no agreement was made since."""
+    anew = [on(BESIDE if k < begins else standing(place), k) for k in range(EPOCHS)]
+
+    def unheard(one: LoggedStatement) -> Statement:
+        said = one.statement
+        if said.epoch < at(begins):
+            return said
+        if one.sender == 12:
+            return said._replace(since=at(begins), entries=(Entry(11),))
+        kept = said.entries[0].considered
+        return said._replace(entries=(Entry(12, considered=kept if begins == 0 else (at(begins - 1),) * 2),))
+
+    whole = evidence({11: climbing(), 12: anew}, WIDE)
+    findings = judge(restated(whole, unheard)).findings
+    found = [
+        one.figures for one in findings if one.what == "a plan without an agreement" and one.who[0] == 11
+    ]
+    assert found == ([] if figures is None else [figures])
 
 
 def test_a_climb_without_a_column_is_found() -> None:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified import columns
 from companion.avoidance.certified.agreements import Agreements
@@ -20,10 +21,11 @@ from companion.avoidance.certified.negotiation import AgreedPlans
 from companion.avoidance.certified.pair import Agreement, Pair
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.reservation import Reservation
-from mavlink_bridge.messages import Message, Tunnel
+from companion.values.components import COMPONENT
+from mavlink_bridge.messages import CommandLong, Message, Source, Tunnel
 from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
-from mavlink_bridge.wire.agreements import Entry
+from mavlink_bridge.wire.agreements import Entry, pack, unpack
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE
 from outrider.__main__ import main
@@ -389,6 +391,31 @@ def test_a_take_off_and_a_landing_without_waiting_are_found(
     both = {"a climb without a reservation", "a descent without a reservation"}
     assert found == (set() if waits else both)
     assert verdict.pairs.farewell == 0 or not waits
+
+
+def test_a_second_take_off_is_judged_also_without_a_landing_between(run: Path) -> None:
+    """A pilot has landed the vehicle: it begins anew on the ground. A repeated order is one order."""
+    log = run / "vehicle-11.tlog"
+    records = list(read_tlog(log))
+    last = records[-1].time
+    (said, *_) = (
+        unpack(message.payload)
+        for _, message in reversed(list(_messages(records)))
+        if isinstance(message, Tunnel) and message.payload_type == AGREEMENTS and message.source.system == 11
+    )
+    own = Source(11, COMPONENT)
+    climb = CommandLong(own, 11, 1, mavlink.MAV_CMD_NAV_TAKEOFF, 0, (0.0,) * 7)
+    anew = said._replace(epoch=said.epoch + 200_000, since=said.epoch + 200_000, entries=())
+    landed = Tunnel(own, 0, 0, AGREEMENTS, pack(anew))
+    codec = Codec()
+    with TlogWriter(log) as writer:
+        for record in records:
+            writer.write(record.time | record.link, record.link, record.frame)
+        for k, message in enumerate((climb, climb, landed, climb, climb), 1):
+            writer.write(last + 500_000 * k, 0, codec.encode(message))
+    verdict = judge(read(run, lambda _what, _share: None))
+    climbs = [one for one in verdict.findings if one.what == "a climb without a reservation"]
+    assert [one.time - climbs[0].time for one in climbs] == [0, 1_500_000]
 
 
 def test_who_replans_without_the_other_s_plan_is_found(

@@ -196,6 +196,13 @@ def test_a_tube_of_the_file_is_kept_or_fails() -> None:
     assert failed(verdict) == {("vehicle 1", "tube")}
 
 
+def test_a_drift_that_was_not_measured_is_noted_with_that_of_wind() -> None:
+    noted = found(Fleet().run()["preflight-1"], "vehicle 1", "drift")
+    assert noted.result is Result.NOTE
+    for word in ("0.5 m counts", "not measured", "5 m/s of wind", "--fly"):
+        assert word in noted.text
+
+
 def test_a_gentle_flight_says_nothing_about_the_tube() -> None:
     verdict = Fleet(flown={1: FLOWN._replace(acceleration=1.5)}).run()["preflight-1"]
     assert failed(verdict) == {("vehicle 1", "tube")}

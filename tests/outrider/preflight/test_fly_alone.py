@@ -16,6 +16,7 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from outrider.preflight.course import Box
 from outrider.preflight.findings import Result
+from outrider.preflight.own_checks import own_checks
 from outrider.preflight.terms import FlightTerms, Phase
 from sitl.node import LINK
 from tests.outrider.preflight.bench import SECOND, Fleet, companion, failed, found
@@ -128,6 +129,22 @@ def test_it_flies_the_box_and_comes_back() -> None:
     assert (east.max(), north.min()) == pytest.approx((0.0, 0.0), abs=1.5)
     assert abs(east[-1]) < 1.5
     assert abs(north[-1]) < 1.5
+    drifts(flying, float(np.hypot(east, north)[: int(np.argmax(down < -3.5))].max()))
+
+
+def drifts(flying: Fleet, climbing: float) -> None:
+    """The drift is what the vehicle had while ``climbing`` (m), at least, and must be within the setting."""
+    node = flying.nodes["preflight-1"]
+    turns = node.turns
+    assert turns is not None
+    assert turns.result is not None
+    assert turns.drift is not None
+    assert climbing - 0.05 <= turns.drift < 1.0
+    for allowed, tube, result in ((0.9, 0.0, Result.FAIL), (1.1, 0.0, Result.PASS), (0.9, 1.0, Result.PASS)):
+        config = companion(certified={"drift": allowed * turns.drift})
+        flown = turns.result._replace(largest=tube)
+        checks = own_checks(1, config, node.autopilot, 1000, flown, turns.drift, doubled=False)
+        assert [one.result for one in checks if one.name == "drift"] == [result]
 
 
 class GroundStation:

@@ -93,8 +93,8 @@ class FarewellChange(NamedTuple):
 class Log(NamedTuple):
     """Contents of one vehicle's tlog.
 
-    ``statements`` and ``orders``: in the order of the log; of a repeated order the first. ``damaged``: number
-    of records that could not be read.
+    ``statements`` and ``orders``: in the order of the log; of a repeated order the first, until the owner
+    begins anew. ``damaged``: number of records that could not be read.
     """
 
     owner: int

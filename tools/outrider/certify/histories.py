@@ -29,6 +29,7 @@ class Kind(Enum):
     FIRST = "begins"
     MADE = "made anew from where the plan before is"
     CARRIED_ON = "the plan before, carried on"
+    RELEASED = "a column at rest that became a plan in space, at rest there"
     ANCHOR = "made anew from elsewhere"
 
 
@@ -177,7 +178,9 @@ def _relation(goes_on: WirePlan, plan: WirePlan) -> Kind:
     axes = 2 if leaves else 3
     begins = goes_on.position[:axes], goes_on.velocity
     made = plan.column == goes_on.column or leaves
-    return Kind.MADE if made and (plan.position[:axes], plan.velocity) == begins else Kind.ANCHOR
+    if not made or (plan.position[:axes], plan.velocity) != begins:
+        return Kind.ANCHOR
+    return Kind.RELEASED if leaves and not any(map(any, plan.accelerations)) else Kind.MADE
 
 
 def _limits(system: int, step: Step, terms: Terms) -> Iterable[Finding]:

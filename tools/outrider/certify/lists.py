@@ -8,7 +8,8 @@ records are gone through in their order, so a statement counts for those that fo
 - It leaves by succession (a newer one of the list was stated by the peer), withdrawal (the peer has
   considered it, or a newer one, and its list lacks it), void (one of the two began anew after its plan, or
   the owner has said farewell) or the peer's farewell.
-- A plan is made only if each peer that has not departed has stated an agreement of the list.
+- A plan is made only if each peer that has not departed has stated an agreement of the list. A column that
+  was reserved may become a plan in space without it, if the peer's newest plan is away from the column.
 - A vehicle that begins anew, or returns, states this: ``since`` is later than its plans before.
 - A farewell is accepted only if its sender has considered a plan of the receiver's last beginning or later.
 """
@@ -20,6 +21,7 @@ from itertools import chain, pairwise
 from typing import NamedTuple
 
 from mavlink_bridge.wire.agreements import Entry, Epochs, Statement
+from mavlink_bridge.wire.plan import WirePlan
 from outrider.certify.evidence import Finding, Log, LoggedPlan, LoggedStatement, Order, Terms
 from outrider.certify.histories import History, Kind
 from outrider.certify.reservations import Reservations
@@ -49,7 +51,7 @@ class _Peer:
         self._stated: set[Epochs] = set()
         self._lacking: list[tuple[int, Epochs, frozenset[Epochs]]] = []
         """Received: epoch of the statement, the newest considered agreement, and the list."""
-        self._plans: set[int] = set()
+        self._plans: dict[int, WirePlan] = {}
         self._departed = False
         """Whether the last own entry says that the peer's farewell is accepted."""
         self._left = False
@@ -61,9 +63,9 @@ class _Peer:
         """Return the place of an agreement in the order of the pair."""
         return sum(one), one[self._owner > self.system]
 
-    def receive_plan(self, epoch: int) -> None:
+    def receive_plan(self, plan: WirePlan) -> None:
         """Take note of a plan of the peer."""
-        self._plans.add(epoch)
+        self._plans[plan.epoch] = plan
 
     def receive(self, statement: Statement) -> None:
         """Take note of a statement of the peer."""
@@ -146,6 +148,11 @@ class _Peer:
         """Whether an agreement of the own list was stated by the peer, and is not void."""
         return any(one in self._stated and not self._void(one) for one in self.listed)
 
+    @property
+    def newest(self) -> WirePlan | None:
+        """Newest plan of the peer that was received."""
+        return self._plans[max(self._plans)] if self._plans else None
+
     def _named(self, one: Epochs) -> str:
         return f"on plans of {one[0]} µs and {one[1]} µs"
 
@@ -160,7 +167,8 @@ def listings(
     owner = log.owner
     peers: dict[int, _Peer] = {}
     sent = {other.system: {step.plan for step in other.steps} for other in others}
-    made = {step.plan.epoch for step in history.steps if step.kind is Kind.MADE}
+    released = {step.plan.epoch for step in history.steps if step.kind is Kind.RELEASED}
+    made = released.union(step.plan.epoch for step in history.steps if step.kind is Kind.MADE)
     named: dict[int, set[int]] = {epoch: set() for epoch in made}
     unstated = {
         step.plan.epoch: before.plan.epoch
@@ -170,6 +178,7 @@ def listings(
     findings: list[Finding] = []
     farewell: int | None = None
     reservations = Reservations(history, terms)
+    columns = log.orders or any(step.plan.column for step in history.steps)
     records: list[LoggedPlan | LoggedStatement | Order] = sorted(
         chain(log.sightings, log.statements, log.orders), key=lambda record: record.number
     )
@@ -180,7 +189,7 @@ def listings(
         sender = record.sender
         if isinstance(record, LoggedPlan):
             if sender != owner and record.plan in sent.get(sender, ()):
-                peers.setdefault(sender, _Peer(owner, sender)).receive_plan(record.plan.epoch)
+                peers.setdefault(sender, _Peer(owner, sender)).receive_plan(record.plan)
             continue
         statement = record.statement
         if statement.fingerprint != terms.fleet_identity.fingerprint:
@@ -211,9 +220,14 @@ def listings(
                 if present is None or peer.system in present:
                     continue
                 present.add(peer.system)
-                if not (entry.departed or statement.farewell or peer.agreed):
-                    findings.append(Finding("a plan without an agreement", who, statement.epoch, ""))
-        if log.orders:
+                if entry.departed or statement.farewell or peer.agreed:
+                    continue
+                epoch, figures = statement.epoch, ""
+                if epoch in released:
+                    figures = reservations.released(epoch, peer.system)
+                if figures or epoch not in released:
+                    findings.append(Finding("a plan without an agreement", who, epoch, figures))
+        if columns:
             reservations.see(record.time, peers)
     for epoch, present in named.items():
         unnamed = sorted(set(terms.fleet) - present - {owner})

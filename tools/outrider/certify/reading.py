@@ -131,6 +131,7 @@ class _Tally:
         self._statements: list[LoggedStatement] = []
         self._orders: list[Order] = []
         self._ahead = 0
+        self._since = self._ordered_since = 0
 
     def add(self, number: int, time: int, message: Tunnel) -> None:
         """Add a TUNNEL of any kind, from the record ``number``, at ``time`` (µs) by the owner's clock.
@@ -148,11 +149,16 @@ class _Tally:
             self._state(number, time, sender, payload)
 
     def order(self, number: int, time: int, message: CommandLong) -> None:
-        """Add a command of the companion to its autopilot; only take-off and landing count."""
+        """Add a command of the companion to its autopilot; only take-off and landing count.
+
+        A repetition is not added. The same order after the owner has begun anew is another one.
+        """
         climbs = message.command == mavlink.MAV_CMD_NAV_TAKEOFF
         if not climbs and message.command != mavlink.MAV_CMD_NAV_LAND:
             return
-        if not self._orders or self._orders[-1].climbs != climbs:
+        again = self._since > self._ordered_since
+        if not self._orders or self._orders[-1].climbs != climbs or again:
+            self._ordered_since = self._since
             self._orders.append(Order(time + self._ahead, climbs, number))
 
     def _state(self, number: int, time: int, sender: int, payload: bytes) -> None:
@@ -167,6 +173,7 @@ class _Tally:
             if not statement.farewell:
                 self._received.add((sender, payload))
             return
+        self._since = max(self._since, statement.since)
         farewell = statement.farewell
         if not statement.away and farewell != (bool(self._words) and self._words[-1].farewell):
             self._words.append(FarewellChange(time, farewell))

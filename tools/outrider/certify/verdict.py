@@ -70,7 +70,7 @@ class Verdict(NamedTuple):
             "required_m": self.required,
             "agreements": self.agreements,
             "planes_checked": self.kept,
-            "plans": len(self.steps(Kind.FIRST, Kind.MADE, Kind.ANCHOR)),
+            "plans": len(self.steps(Kind.FIRST, Kind.MADE, Kind.RELEASED, Kind.ANCHOR)),
             "carried_on": len(self.steps(Kind.CARRIED_ON)),
             "anchors": len(self.steps(Kind.ANCHOR)),
             "farewells": sum(len(history.leaves) for history in self.histories),

@@ -1,6 +1,6 @@
-"""Flight of one vehicle alone, by a companion with committed plans, which measures its tube.
+"""Flight of one vehicle alone, by a companion with committed plans, which measures its tube and its drift.
 
-    go → take-off → the places of the course → land → tracking error
+    go → take-off → the places of the course → land → tracking error, drift
 
 The companion is that of ``outrider fly``: all conditions of a start and all reactions to faults are its own.
 It hears no other vehicle, so the fleet of its plans is the vehicle alone.
@@ -27,6 +27,7 @@ from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.signing import Signing
 from outrider.onboard.orders import OPERATOR, Orders
 from outrider.preflight.course import Box, outside
+from outrider.preflight.drift import DriftMeter
 from outrider.preflight.tube import TrackingError, TrackingMeter
 
 _REPEAT_US: Final = 1_000_000
@@ -74,6 +75,7 @@ class LoneFlight:
         self._orders = Orders(system, height, self._ordering)
         self._companion = Companion(self._config, system, target, frame, thread_time_ns, signing)
         self._meter = TrackingMeter(system, planar=config.planar, lead=config.setpoint_lead_us)
+        self._drift = DriftMeter()
         self.trouble = ""
         self._places: list[Array] | None = None
         self._leg = -1
@@ -114,6 +116,11 @@ class LoneFlight:
         """The tracking error so far."""
         return self._meter.result
 
+    @property
+    def drift(self) -> float | None:
+        """Largest distance (m) from the axis of its column in take-off and landing; None before them."""
+        return self._drift.largest
+
     def stop(self, now: int, why: str) -> None:
         """Land because of ``why``; the flight does not count."""
         self.trouble = self.trouble or why
@@ -132,6 +139,9 @@ class LoneFlight:
         sent = [one.data for one in self._companion.step(now, given) if one.link == "autopilot"]
         for data in (*inbox, *sent):
             self._meter.receive(now, data)
+        own = self._companion.world.at(now).own
+        if own is not None:
+            self._drift.see(self._companion.pilot.phase, own.position)
         if self._companion.pilot.phase is Phase.YIELDED:
             self.trouble = self.trouble or "a pilot or another controller has the vehicle"
         elif self.over and not self._complete:

@@ -273,9 +273,10 @@ class Preflight:
     def _report(self, now: int) -> None:
         """Check the own vehicle, and make the report that is sent from now on."""
         terms, autopilot, clock, flown = self._terms, self.autopilot, self.clock.bound, self._terms.flown
+        drift = None
         if self.turns is not None:
-            flown = self.turns.result
-        checks = own_checks(terms.system, terms.config, autopilot, clock, flown, doubled=self._doubled)
+            flown, drift = self.turns.result, self.turns.drift
+        checks = own_checks(terms.system, terms.config, autopilot, clock, flown, drift, doubled=self._doubled)
         self._checks = (*checks, *self._of_flight())
         links = [meter.figure(now).report(system) for system, meter in self.meters.items()]
         figures = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import hypot
+from math import ceil, hypot
 from typing import Final
 
 from companion.config import CompanionConfig
@@ -19,6 +19,8 @@ CLOCK: Final = ("certified", "clock_us")
 TUBE: Final = ("certified", "tube")
 _EXERCISED: Final = 0.8
 """Share of ``limits.u_max`` that the set-points of a flight must reach, for its tracking error to count."""
+_IN_WIND: Final = "simulated: 0.1 m in calm air, in 5 m/s of wind 0.8 m (ArduPilot) and 2.1 m (PX4)"
+"""Drifts of emulated autopilots (docs/certified.md)."""
 _SHORT_TIMEOUT_S: Final = 0.5
 """Time-out (s) up to which a vehicle without set-points is still near its plan."""
 
@@ -29,12 +31,14 @@ def own_checks(
     autopilot: AutopilotFigures,
     clock: int | None,
     flown: TrackingError | None,
+    drift: float | None,
     *,
     doubled: bool,
 ) -> Iterator[Check]:
     """Yield the checks of the vehicle ``system``.
 
-    ``clock`` (µs): bound of its clock, None if unknown; ``flown``: its tracking error in a recorded flight.
+    ``clock`` (µs): bound of its clock, None if unknown; ``flown``: its tracking error in a recorded flight,
+    or alone; ``drift``: its largest distance (m) from its column in take-off and landing.
     """
     subject = f"vehicle {system}"
 
@@ -51,6 +55,7 @@ def own_checks(
     yield _sigma(subject, config, autopilot.sigma)
     yield _clock(subject, config, clock)
     yield _tube(subject, config, flown)
+    yield _drift(subject, config, flown, drift)
     yield from _limits(subject, config, profile, autopilot)
     yield _timeout(subject, autopilot, TIMEOUTS[profile.autopilot])
     unread = [name for name in autopilot.unread if name not in TIMEOUTS.values()]
@@ -130,6 +135,19 @@ def _tube(subject: str, config: CompanionConfig, flown: TrackingError | None) ->
     if stated_at(config, TUBE) and flown.largest > tube:
         return Check(subject, "tube", Result.FAIL, f"{text}, more than certified.tube, {tube:g} m")
     return Check(subject, "tube", Result.PASS, text)
+
+
+def _drift(subject: str, config: CompanionConfig, flown: TrackingError | None, drift: float | None) -> Check:
+    """Compare the drift with what others allow for a column: ``certified.drift``, or the tube."""
+    allowed = config.certified.drift
+    if drift is None:
+        text = f"{allowed:g} m counts in take-off and landing, not measured; {_IN_WIND}; --fly measures it"
+        return Check(subject, "drift", Result.NOTE, text)
+    text = f"{drift:.2f} m from its column at most in take-off and landing, in the wind of today"
+    if drift > max(allowed, 0.0 if flown is None else flown.largest):
+        text += f"; more than certified.drift, {allowed:g} m: state {ceil(10.0 * drift) / 10.0:g} or more"
+        return Check(subject, "drift", Result.FAIL, text)
+    return Check(subject, "drift", Result.PASS, text)
 
 
 def _timeout(subject: str, autopilot: AutopilotFigures, name: str) -> Check:

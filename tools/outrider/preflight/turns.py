@@ -58,8 +58,16 @@ class Turns:
     @property
     def result(self) -> TrackingError | None:
         """Tracking error of the flight; None without one that counts."""
-        landed = self.stage is Stage.LANDED and self.flight is not None
-        return self.flight.result if landed and self.flight is not None else None
+        return None if (flight := self._landed) is None else flight.result
+
+    @property
+    def drift(self) -> float | None:
+        """Drift (m) of the flight in take-off and landing; None without one that counts."""
+        return None if (flight := self._landed) is None else flight.drift
+
+    @property
+    def _landed(self) -> LoneFlight | None:
+        return self.flight if self.stage is Stage.LANDED else None
 
     def end(self, why: str) -> None:
         """Do not fly, because of ``why``, which is empty if a check on the ground says it."""

@@ -61,9 +61,10 @@ class Rough(NamedTuple):
 class Habits(NamedTuple):
     """Of one vehicle, µs of the run: when it is switched on, when it steers from, when it leaves; when it is
     not called, and when it may not steer (from, till); how far its clock is ahead. Until it steers it wanders
-    about its place by ``wanders`` m. When it ``returns`` it joins again where it is. When its companion
-    ``restarts`` it has forgotten everything, and begins anew where the vehicle is. One that ``takes_off``
-    stands on the ground below its place before, and climbs for ``CLIMB``; one that ``lands`` stays down."""
+    about its place by ``wanders`` m; on the ground only its estimate does. When it ``returns`` it joins again
+    where it is. When its companion ``restarts`` it has forgotten everything, and begins anew where the
+    vehicle is. One that ``takes_off`` stands on the ground below its place before, and climbs for ``CLIMB``;
+    one that ``lands`` stays down."""
 
     on: int = 0
     steers: int = 0
@@ -166,7 +167,9 @@ class Vehicle:
         return not self.flight.reservation.missing(now)
 
     def _stand(self, now: int, since: int, goal: Array) -> None:
-        self.flight.park(now, self._at(0.0), joins=since >= self.habits.takes_off)
+        stands = self._at(0.0)
+        stands.position[:2] += self._wandered(since)[:2]
+        self.flight.park(now, stands, joins=since >= self.habits.takes_off)
         if self.flight.reservation.joined and self.may_move(now):
             self._let_go(now)
             self._handles = self._climb
@@ -233,8 +236,12 @@ class Vehicle:
     def _here(self, now: int, since: int) -> Array:
         epoch = self.flight.commitment.epoch(now)
         there = horizon_of(self.plan(epoch)).at(now).position if self.plans else self.place
-        result: Array = there + self.habits.wanders * np.sin(1e-6 * since * np.array([7.0, 5.0, 3.0]))
+        result: Array = there + self._wandered(since)
         return result
+
+    def _wandered(self, since: int) -> Array:
+        offset: Array = self.habits.wanders * np.sin(1e-6 * since * np.array([7.0, 5.0, 3.0]))
+        return offset
 
     def confirmed(self, system: int) -> bool:
         """Whether it may plan beside ``system`` because of an agreement."""

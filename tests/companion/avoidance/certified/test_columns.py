@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,26 @@ from hypothesis import strategies as st
 from companion.avoidance.certified import constraint_sources
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.columns import Distances
+from companion.avoidance.certified.committed import resting
+from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.negotiation import Negotiation
-from companion.values.horizon import Array
+from companion.avoidance.certified.reservation import Reservation
+from companion.config import CompanionConfig
+from companion.values.components import COMPONENT
+from companion.values.horizon import Array, Motion
+from mavlink_bridge.errors import PlanWireError
+from mavlink_bridge.messages import Source
+from mavlink_bridge.wire.agreements import Statement, unpack
+from mavlink_bridge.wire.plan import pack
 from tests.companion.avoidance.certified.draws import delays, losses
-from tests.companion.avoidance.certified.swarm import NEVER, Habits, Rough, Swarm, Vehicle
-from tests.companion.avoidance.certified.two import LENGTH, NOW, OTHER, OWN, agreed, plan
+from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
+from tests.companion.avoidance.certified.swarm import CLIMB, FLEET, NEVER, Habits, Rough, Swarm, Vehicle
+from tests.companion.avoidance.certified.two import LENGTH, NOW, OTHER, OWN, agreed, agreements, leaving, plan
 
 UNTIL = 6_000_000
 """µs of a run."""
+UP = np.array([0.0, 0.0, 1.0])
+"""m."""
 ROWS = 2.0
 """m between two places on the ground, which is little more than needed."""
 FLIGHTS = settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
@@ -136,15 +149,152 @@ def test_who_hears_nothing_of_an_expected_vehicle_does_not_climb() -> None:
     assert not swarm.faults()
 
 
+def test_a_silent_vehicle_that_cannot_meet_the_column_does_not_keep_it_from_becoming_a_plan_in_space() -> (
+    None
+):
+    """It begins anew while the other climbs, is heard once more, and then never again."""
+    begins = 900_000
+    habits = [Habits(takes_off=0), Habits(), Habits(restarts=begins, frozen=((begins + 100_000, NEVER),))]
+    swarm = fly(habits, Rough(), 1, 4_000_000)
+    ((climbs, left),) = swarm.vehicles[0].columns
+    assert climbs < begins < climbs + CLIMB
+    assert swarm.vehicles[0].flight.agreements.missing() == {3}
+    assert left < climbs + CLIMB + 3 * LENGTH
+    assert not swarm.faults()
+
+
+@FLIGHTS
+@given(st.integers(0, 2**16), losses, delays)
+def test_plans_are_apart_if_another_begins_anew_during_the_climb(seed: int, loss: float, delay: int) -> None:
+    """It rests when its companion restarts; afterwards both wander, and it may be silent for ever."""
+    rng = np.random.default_rng(seed)
+    begins = int(rng.integers(300_000, 2_000_000))
+    silent = ((begins + int(rng.integers(20_000, 400_000)), NEVER),) if rng.random() < 0.5 else ()
+    row, wander = places(2, seed), wandering(2, seed)
+    swarm = Swarm(
+        row, Rough(loss, delay, 0.2), [Habits(takes_off=0), Habits(restarts=begins, frozen=silent)], seed
+    )
+    swarm.run(UNTIL, lambda since, system: row[system - 1] if since < begins else wander(since, system))
+    assert not swarm.faults()
+
+
+@pytest.mark.parametrize(("x", "clear"), [(1.2, False), (4.0, True), (None, False)])
+def test_who_can_meet_a_column_is_near_or_unknown(x: float | None, clear: bool) -> None:
+    """The plan of the other is a column, too: 1.5 m are needed."""
+    one = agreements(OWN, OWN, OTHER)
+    one.made(plan()._replace(column=True))
+    if x is not None:
+        one.receive_plan(NOW, OTHER, pack(plan(x=x)._replace(column=True)))
+    assert one.missing() == {OTHER}
+    assert one.clear({OTHER}) is clear
+
+
+def test_a_column_that_was_never_reserved_waits_for_all_agreements() -> None:
+    """Another controller took the vehicle off: planes may be kept that are not upright."""
+    for reserved in (False, True):
+        flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+        stands = Motion(np.zeros(3), np.zeros(3), np.zeros(3))
+        for now in range(EPOCH, EPOCH + 4 * LENGTH, LENGTH):
+            if reserved:
+                flight.park(now, stands, joins=True)
+            else:
+                flight.reservation.begin(now, stands.position, joins=True)
+        far = resting(now, DT, STEPS, (9.0, 0.0, 0.0), FLEET.fingerprint)
+        flight.agreements.receive_plan(now, OTHER, pack(far))
+        assert flight.agreements.missing() == {OTHER}
+        assert flight.reservation.may_be_left() is reserved
+
+
 def test_who_does_not_take_off_is_passed_and_is_not_waited_for() -> None:
     swarm = fly([Habits(takes_off=NEVER), Habits(), Habits()], Rough(0.2, 100_000), 3)
     assert not swarm.faults()
     assert {made.system for made in swarm.made() if made.found} == {2, 3}
 
 
-def below(until: int) -> Swarm:
-    """1 is to take off below 2, which hovers."""
-    swarm = Swarm(np.array([[0.0, 0.0, 5.0], [0.3, 0.0, 5.0]]), Rough(), [Habits(takes_off=0), Habits()], 0)
+@pytest.mark.parametrize("noise", [0.06, 0.2])
+def test_who_waits_for_room_keeps_its_column_in_spite_of_noise_and_says_as_many_farewells(
+    noise: float,
+) -> None:
+    """A column that is begun anew is announced an epoch later: its farewells would come late, or never."""
+    still, noisy = farewells(below(2_000_000)), farewells(below(2_000_000, noise))
+    assert len(still) > 20
+    assert [said.epoch for said in noisy] == [said.epoch for said in still]
+
+
+def test_who_waited_for_room_joins_where_it_stands() -> None:
+    """Its column is where it reports to be when it joins, not where it was parked."""
+    swarm = below(3_000_000, 0.2)
+    one = swarm.vehicles[0]
+    stands = Motion(np.array([-3.0, 0.1, 0.0]), np.zeros(3), np.zeros(3))
+    one.flight.park(EPOCH + 3_000_000, stands, joins=True)
+    column = one.flight.commitment.announced()
+    assert one.flight.reservation.joined
+    assert column is not None
+    np.testing.assert_allclose(column.position_m, stands.position, atol=1e-3)
+
+
+def test_who_has_landed_does_not_give_way_to_a_column() -> None:
+    """Of two columns that are too near, the one of the higher id moves aside; but not once it has landed."""
+    two = agreed()
+    two.make(OWN, plan(1)._replace(column=True))
+    two.first.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, 1.2)._replace(column=True)))
+    assert two.first.columns == {OTHER}
+    assert two.first.near() == {OTHER}
+    two.first.receive_statement(NOW + LENGTH, OTHER, leaving(1))
+    assert two.first.left.keys() == {OTHER}
+    assert two.first.columns == set()
+
+
+def test_the_wait_for_a_reservation_asks_once_who_has_agreed(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    often: list[int] = []
+    unreserved, missing = Agreements.unreserved, Reservation.missing
+
+    def counted(reservation: Reservation, now: int) -> str:
+        asked.clear()
+        found = missing(reservation, now)
+        often.append(len(asked))
+        return found
+
+    monkeypatch.setattr(Agreements, "unreserved", lambda self: asked.append(1) or unreserved(self))
+    monkeypatch.setattr(Reservation, "missing", counted)
+    fly([Habits(takes_off=0), Habits()], Rough(), 1, 1_500_000)
+    assert often
+    assert max(often) == 1
+
+
+@pytest.mark.parametrize("column", [False, True])
+def test_how_far_a_vehicle_is_from_its_plan_is_judged_by_the_plan_of_the_epoch(column: bool) -> None:
+    """Also at the epoch's first step, before ``due`` turns to its plan: a column counts horizontally."""
+    here = np.array([0.0, 0.0, 5.0])
+    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    flight.stand(EPOCH, here)
+    now = EPOCH
+    while flight.commitment.following is None or not flight.commitment.following.column:
+        now += LENGTH
+        flight.lower(now)
+    if not column:
+        now += LENGTH
+        flight.commitment.turn(now)
+        flight.commitment.leave_column()
+    flight.watch(now + LENGTH - 1, Motion(here + UP, np.zeros(3), np.zeros(3)))
+    assert flight.deviation == pytest.approx(1.0 if column else 0.0, abs=1e-3)
+    flight.watch(now + LENGTH, Motion(here + UP, np.zeros(3), np.zeros(3)))
+    assert flight.deviation == pytest.approx(0.0 if column else 1.0, abs=1e-3)
+
+
+def farewells(swarm: Swarm) -> list[Statement]:
+    found = []
+    for payload in swarm.sent:
+        with suppress(PlanWireError):
+            found.append(unpack(payload))
+    return [said for said in found if said.farewell]
+
+
+def below(until: int, noise: float = 0.0) -> Swarm:
+    """1 is to take off below 2, which hovers; its estimate on the ground has ``noise`` (m)."""
+    habits = [Habits(takes_off=0, wanders=noise), Habits()]
+    swarm = Swarm(np.array([[0.0, 0.0, 5.0], [0.3, 0.0, 5.0]]), Rough(), habits, 0)
     swarm.run(until, lambda since, system: np.array([0.3, 0.0, 5.0]))
     return swarm
 

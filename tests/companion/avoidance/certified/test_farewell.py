@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.committed import resting
 from companion.avoidance.certified.fingerprint import fingerprint
@@ -15,13 +16,21 @@ from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
 from companion.config.certified import CertifiedConfig
 from companion.telemetry.sharing import position_message
+from companion.values.components import COMPONENT
 from companion.values.horizon import Array
+from companion.values.phase import Phase
 from companion.world import View, World
-from mavlink_bridge.messages import Source
+from mavlink_bridge.messages import Source, Tunnel
+from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import Entry, Statement
-from mavlink_bridge.wire.plan import pack
+from mavlink_bridge.wire.agreements import pack as pack_statement
+from mavlink_bridge.wire.agreements import unpack as unpack_statement
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
+from mavlink_bridge.wire.plan import pack, unpack
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
 from tests.companion.avoidance.certified.swarm import FLEET
+from tests.companion.bench import FLEET as BENCH
+from tests.companion.bench import Bench, only
 
 LEFT, OWN, STRANGER = 1, 2, 77
 CONFIG = CompanionConfig(
@@ -131,3 +140,28 @@ def test_who_was_carried_aside_after_landing_and_switched_off_keeps_nobody_away_
     horizon = flight.horizon()
     assert horizon is not None
     assert np.linalg.norm(horizon.at(begin + 8_000_000).position - goal) < 0.1
+
+
+def test_who_lands_without_a_reservation_says_farewell_with_a_column() -> None:
+    """The other hovers above it and is silent for ever, so there is no room for a column before."""
+    config = {"avoidance": "certified", "guard": {"settle_us": 1_000_000}}
+    bench = Bench(**config).take_off()
+    bench.fly(1.0)
+    above = resting(bench.now - bench.now % 200_000, DT, STEPS, (0.3, 0.0, 9.0), BENCH.fingerprint)
+    said = Statement(fingerprint(bench.config, BENCH), above.epoch, above.epoch)
+    other = Source(12, COMPONENT)
+    bench.fly(
+        1.0,
+        bench.datagram("swarm", Tunnel(other, 0, 0, PLAN, pack(above))),
+        bench.datagram("swarm", Tunnel(other, 0, 0, AGREEMENTS, pack_statement(said))),
+    )
+    bench.order(mavlink.MAV_CMD_NAV_LAND)
+    sent = bench.fly(5.0)
+    assert bench.phase is Phase.DONE
+    told = only(Tunnel, sent, "swarm")
+    columns = {one.epoch: one.column for one in (unpack(m.payload) for m in told if m.payload_type == PLAN)}
+    statements = [unpack_statement(one.payload) for one in told if one.payload_type == AGREEMENTS]
+    farewells = [one.epoch for one in statements if one.farewell]
+    assert farewells
+    assert all(columns[epoch] for epoch in farewells)
+    assert not columns[min(columns)]
