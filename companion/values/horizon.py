@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, output, part
-from companion.values.knot_store import STORE, Array
+from companion.values.knot_store import STORE
+
+Array = NDArray[np.float64]
 
 
 class Motion(NamedTuple):
