@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from companion.values.knot_store import KnotStore
 
 
 @given(st.lists(st.tuples(st.booleans(), st.integers(1, 20)), max_size=300))
 def test_a_row_holds_its_knots_until_the_array_is_gone(acts: list[tuple[bool, int]]) -> None:
-    store, held = KnotStore(), []
+    store = KnotStore()
+    held: list[tuple[NDArray[np.float64], int]] = []
     for number, (adds, size) in enumerate(acts):
         if adds or not held:
             held.append((knots := np.full((size, 9), float(number)), store.row_of(knots)))
