@@ -65,22 +65,18 @@ class PlanClock:
         ``epoch`` is on the sender's clock, the result on the own one. Returns None while the beginning cannot
         be determined. A plan that is sent again, with the same epoch, keeps its result.
         """
-        if epoch != self._epoch:
-            self._epoch, self._begins = epoch, self._begins_first(now, epoch, dt)
-        return self._begins
-
-    def _begins_first(self, now: int, epoch: int, dt: int) -> int | None:
-        """Return when a plan begins that is received for the first time."""
-        clock = self._clock
+        if epoch == self._epoch:
+            return self._begins
+        self._epoch, clock = epoch, self._clock
         dated = clock.date(now, epoch)
-        if dated is None:
-            return None
-        time, stamped = dated
-        if not stamped:
-            return None
-        estimate = time + clock.skew
-        if -_EPOCH_TOLERANCE_US <= estimate - epoch <= _EPOCH_TOLERANCE_US:
-            return epoch
-        if now - self._stale <= epoch <= now + dt and clock.support < _MIN_PLANS_POSSIBLE_EPOCH:
-            return epoch
-        return estimate if clock.support >= _MIN_PLANS else None
+        if dated is None or not dated[1]:
+            begins = None
+        else:
+            estimate = dated[0] + clock.skew
+            possible = now - self._stale <= epoch <= now + dt and clock.support < _MIN_PLANS_POSSIBLE_EPOCH
+            if possible or -_EPOCH_TOLERANCE_US <= estimate - epoch <= _EPOCH_TOLERANCE_US:
+                begins = epoch
+            else:
+                begins = estimate if clock.support >= _MIN_PLANS else None
+        self._begins = begins
+        return begins

@@ -116,15 +116,12 @@ class Track:
         if dated is None:
             self._undated += 1
             return False
-        accepted = self._rewind.put(dated, z)
-        self._update()
-        return accepted
-
-    def _update(self) -> None:
-        """Update ``belief`` and ``time``."""
-        self.belief = belief = self._rewind.belief
+        rewind = self._rewind
+        accepted = rewind.put(dated, z)
+        self.belief = belief = rewind.belief
         if belief is not None:
             self.time = belief.time + self._clock.skew
+        return accepted
 
     @property
     def late(self) -> int:
@@ -146,7 +143,8 @@ class Track:
         """
         if self._config.stamps:
             self._clock.answered(received, asked, stamp)
-            self._update()
+            if self.belief is not None:
+                self.time = self.belief.time + self._clock.skew
 
     def when(self, received: int, stamp: int) -> int:
         """Return when the content of another message of the same sender was true, µs.

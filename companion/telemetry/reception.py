@@ -77,11 +77,9 @@ def accepts(
         # ADSB_VEHICLE may come from any sender on the swarm link, not only from the own system.
         wanted = wanted | traffic
         return lambda identifier, sender, component: (
-            (
-                identifier in wanted
-                and sender != system
-                and not (identifier in _POSITION_AND_PLAN and ignores(sender, component))
-            )
-            or (identifier in sensors and sender == system)
+            identifier in sensors
+            if sender == system
+            else identifier in wanted
+            and not (identifier in _POSITION_AND_PLAN and ignores(sender, component))
         )
     return lambda identifier, _sender, _component: identifier in wanted

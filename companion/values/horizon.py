@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, output, part
+from companion.values.knot_store import STORE
 
 Array = NDArray[np.float64]
 
@@ -137,9 +138,8 @@ class HorizonTable:
         self._steps = steps
         self._dt = dt
         self._rows: dict[int, int] = {}
-        # Epoch (µs), dt (µs) and index of the last knot of each horizon.
-        self._heads = np.zeros((0, 3), dtype=np.int64)
-        self._knots = np.zeros((0, 1, 9))
+        # Epoch (µs), dt (µs), index of the last knot, and row in the store, of each horizon.
+        self._heads = np.zeros((0, 4), dtype=np.int64)
         self._latest: dict[int, Horizon] = {}
         # The last answer of ``_rows_of``: the same senders, in the same tuple, are asked for again and again.
         self._asked: Sequence[int] = ()
@@ -155,22 +155,15 @@ class HorizonTable:
             self._fresh.add(sender)
 
     def _update_rows(self) -> None:
-        """Write the horizons stored since the last call into the table, row by row."""
+        """Write the heads of the horizons stored since the last call."""
         new = len(self._latest) - len(self._rows)
         if new:
             self._rows = {sender: row for row, sender in enumerate(self._latest)}
-            self._heads = np.concatenate([self._heads, np.tile([0, 1, 0], (new, 1))])
-            self._knots = np.concatenate([self._knots, np.zeros((new, *self._knots.shape[1:]))])
-        rows, heads = [], []
-        for sender in self._fresh:
-            row, (epoch, dt, knots) = self._rows[sender], self._latest[sender]
-            count, longest = len(knots), self._knots.shape[1]
-            if count > longest:
-                self._knots = np.pad(self._knots, ((0, 0), (0, count - longest), (0, 0)))
-            self._knots[row, :count] = knots
-            rows.append(row)
-            heads.append((epoch, dt, count - 1))
-        self._heads[rows] = heads
+            self._heads = np.concatenate([self._heads, np.zeros((new, 4), dtype=np.int64)])
+        horizons = [self._latest[sender] for sender in self._fresh]
+        self._heads[[self._rows[sender] for sender in self._fresh]] = [
+            (epoch, dt, len(knots) - 1, STORE.row_of(knots)) for epoch, dt, knots in horizons
+        ]
         self._fresh.clear()
 
     def positions(self, senders: Sequence[int], start: int, oldest: int) -> tuple[Array, NDArray[np.bool_]]:
@@ -206,9 +199,9 @@ class HorizonTable:
         rows = self._rows_of(senders)
         if not self._rows:
             return np.zeros((len(senders), 3))
-        epochs, dts, lasts = self._heads[rows].T
+        epochs, dts, lasts, stored = self._heads[rows].T
         segments = np.clip((times - epochs) // dts, 0, lasts)
-        planned: Array = self._knots[rows, segments, 6:9]
+        planned: Array = STORE.knots[stored, segments, 6:9]
         return np.where((rows >= 0)[:, None], planned, 0.0)
 
     def _rows_of(self, senders: Sequence[int]) -> NDArray[np.int64]:
@@ -233,7 +226,7 @@ class HorizonTable:
 
         ``known`` (M,) becomes true for horizons whose epoch is ``oldest`` (µs) or later.
         """
-        _sample(self._knots, self._heads, rows, times, self._dt, oldest, positions, known)
+        _sample(STORE.knots, self._heads, rows, times, self._dt, oldest, positions, known)
 
 
 @kernel(VOID, array(3), array(2, INT), *[array(1, INT)] * 2, INT, INT, output(3), output(1, BOOL))
@@ -249,14 +242,14 @@ def _sample(
 ) -> None:
     """Write ``HorizonTable._sample``.
 
-    ``heads`` (S, 3): epoch, dt (µs) and index of the last knot for each row of ``knots`` (S, k, 9). ``step``
-    (µs) is the time between two of the positions (M, n, 3).
+    ``heads`` (H, 4): epoch, dt (µs), index of the last knot and row in ``knots`` (S, k, 9) of each horizon.
+    ``step`` (µs) is the time between two of the positions (M, n, 3).
     """
     for j in range(len(rows)):
         row = rows[j]
         known[j] = row >= 0 and heads[row, 0] >= oldest
         if row >= 0:
             elapsed = times[j % len(times)] - heads[row, 0]
-            _positions_of(knots[row], heads[row, 2], elapsed, step, heads[row, 1], positions[j])
+            _positions_of(knots[heads[row, 3]], heads[row, 2], elapsed, step, heads[row, 1], positions[j])
         else:
             positions[j] = 0.0

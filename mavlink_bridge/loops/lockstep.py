@@ -39,7 +39,7 @@ class Scheduled(NamedTuple):
 
 
 class StepObserver(Protocol):
-    """Observer of every step of a node and of every datagram that enters (``in``) or leaves (``out``) it.
+    """Observer of every step of a node and of all datagrams that enter (``in``) or leave (``out``) it.
 
     An observer must not change anything.
     """
@@ -47,12 +47,12 @@ class StepObserver(Protocol):
     def begin(self, now: int, node: str, /) -> None:
         """Observe the beginning of a step of ``node`` at ``now`` (µs of the node's clock).
 
-        Calls for the datagrams of the step follow: first those that enter, then those that leave.
+        Calls for the datagrams of the step follow: first for those that enter, then for those that leave.
         """
         ...
 
-    def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        """Observe a datagram of the step at ``now`` (µs of the node's clock)."""
+    def __call__(self, now: int, node: str, direction: Direction, datagrams: Sequence[Datagram], /) -> None:
+        """Observe one or more datagrams of the step at ``now`` (µs of the node's clock)."""
         ...
 
 
@@ -209,5 +209,5 @@ class LockStep:
             for time, schedule, box in zip(times, schedules, boxes, strict=True):
                 if direction == "in":
                     tap.begin(time, schedule.name)
-                for datagram in box:
-                    tap(time, schedule.name, direction, datagram)
+                if box:
+                    tap(time, schedule.name, direction, box)

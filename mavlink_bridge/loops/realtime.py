@@ -172,5 +172,5 @@ class RealTime:
         for tap in self._taps:
             if direction == "in":
                 tap.begin(now, self._node.name)
-            for datagram in datagrams:
-                tap(now, self._node.name, direction, datagram)
+            if datagrams:
+                tap(now, self._node.name, direction, datagrams)

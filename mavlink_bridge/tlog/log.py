@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import gzip
 import zlib
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import closing
 from functools import lru_cache
 from io import BufferedIOBase, BufferedReader
@@ -109,16 +109,29 @@ class TlogWriter:
         Bytes that are no frame are left out and counted in ``skipped_bytes``. Raises LogError for a link
         outside 0…3 and for a time that does not fit.
         """
-        if not (0 <= link < LINKS and 0 <= time_us < 1 << 64):
-            raise LogError(f"time {time_us} µs, link {link}: not in a tlog's range")
-        stamp = _STAMP.pack(time_us & ~3 | link)
-        target = self._file if self._gzip is None else self._gzip
-        # Several logs of one process may record the same datagram.
-        short = type(data) is bytes and len(data) <= MAX_CACHED_BYTES
-        frames, withheld, at = _leading(data) if short else _leading.__wrapped__(data)
-        target.write(stamp.join(frames))
-        self.records += len(frames) - 1
-        self.withheld += withheld
+        self.write_all(time_us, [(link, data)])
+
+    def write_all(self, time_us: int, datagrams: Iterable[tuple[int, bytes]]) -> None:
+        """Write the records of several datagrams of one time, each with its link, as ``write`` does."""
+        if not 0 <= time_us < 1 << 64:
+            raise LogError(f"time {time_us} µs: not in a tlog's range")
+        stamps = [_STAMP.pack(time_us & ~3 | link) for link in range(LINKS)]
+        records = []
+        for link, data in datagrams:
+            if not 0 <= link < LINKS:
+                raise LogError(f"link {link}: not in a tlog's range")
+            # Several logs of one process may record the same datagram.
+            short = type(data) is bytes and len(data) <= MAX_CACHED_BYTES
+            frames, withheld, at = _leading(data) if short else _leading.__wrapped__(data)
+            records.append(stamps[link].join(frames))
+            self.records += len(frames) - 1
+            if withheld or at < len(data):
+                self.withheld += withheld
+                records.extend(self._search(stamps[link], data, at))
+        (self._file if self._gzip is None else self._gzip).write(b"".join(records))
+
+    def _search(self, stamp: bytes, data: bytes, at: int) -> Iterator[bytes]:
+        """Yield the records of ``data`` from ``at`` on, where an irregularity begins."""
         while at < len(data):
             frame = frame_at(data, at)
             if isinstance(frame, Flaw) or not (frame.known or _is_frame_boundary(data, at + len(frame.data))):
@@ -130,8 +143,8 @@ class TlogWriter:
             if recorded is None:
                 self.withheld += 1
                 continue
-            target.write(stamp + recorded)
             self.records += 1
+            yield stamp + recorded
 
 
 def _recorded(frame: Frame) -> bytes | None:

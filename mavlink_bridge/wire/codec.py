@@ -5,8 +5,9 @@ Bytes from outside never raise; dropped frames are counted.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
+from types import EllipsisType
 from typing import NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -14,16 +15,42 @@ from pymavlink.dialects.v20 import all as mavlink
 from mavlink_bridge.errors import EncodeError
 from mavlink_bridge.messages import BY_ID, BY_TYPE, Converter, Message, Source, StatusText
 from mavlink_bridge.messages.status import TEXT_LENGTH, text_chunks
-from mavlink_bridge.wire.framing import Frame, Framer, frame_v1, frame_v2
+from mavlink_bridge.wire.framing import (
+    MAX_CACHED_BYTES,
+    Frame,
+    Framer,
+    frame_v1,
+    frame_v2,
+    leading_frames,
+)
 from mavlink_bridge.wire.signing import Signing
 
 Accept = Callable[[int, int, int], bool]
 
 
+class _Received:
+    """Frame with its message: None if a value is invalid, ``...`` until a receiver has accepted the frame."""
+
+    __slots__ = ("component", "declared", "frame", "message", "message_id", "system")
+
+    def __init__(self, frame: Frame) -> None:
+        self.frame = frame
+        self.message_id, self.system, self.component = frame.message_id, frame.system, frame.component
+        self.declared = frame.message_id in BY_ID
+        self.message: Message | EllipsisType | None = ...
+
+    def decode(self) -> Message | None:
+        """Decode the payload, once for all receivers of the frame in this process."""
+        source = Source(self.system, self.component)
+        self.message = message = BY_ID[self.message_id].parse(source, self.frame.payload)
+        return message
+
+
 @lru_cache(maxsize=1024)
-def _read(frame: Frame) -> Message | None:
-    """Parse a frame with ``Converter.parse``, only once for all receivers of the frame in this process."""
-    return BY_ID[frame.message_id].parse(Source(frame.system, frame.component), frame.payload)
+def _contents(data: bytes) -> tuple[_Received, ...] | None:
+    """Return the frames of a datagram; None if it holds anything else."""
+    frames, end = leading_frames(data)
+    return tuple(map(_Received, frames)) if end == len(data) else None
 
 
 class Counters(NamedTuple):
@@ -93,16 +120,25 @@ class Codec:
         echo, mission items, altitude, home, estimator reports.
         """
         accept, signing = self._accept, self._signing
+        contents: Iterable[_Received] | None = None
+        # A bytearray may change, and may not be hashed.
+        if type(data) is bytes and len(data) <= MAX_CACHED_BYTES and not self._framer.rest:
+            contents = _contents(data)
+        if contents is None:
+            contents = map(_Received, self._framer.feed(data, whole=whole))
         found: list[Message] = []
-        for frame in self._framer.feed(data, whole=whole):
-            _, _, system, component, message_id, _, _, _, _ = frame
-            if message_id not in BY_ID or (accept is not None and not accept(message_id, system, component)):
+        for one in contents:
+            if not one.declared or (
+                accept is not None and not accept(one.message_id, one.system, one.component)
+            ):
                 self._filtered += 1
                 continue
-            if signing is not None and signing.check(frame) is not None:
+            if signing is not None and signing.check(one.frame) is not None:
                 self._refused += 1
                 continue
-            message = _read(frame)
+            message = one.message
+            if message is ...:
+                message = one.decode()
             if message is None:
                 self._bad += 1
             else:

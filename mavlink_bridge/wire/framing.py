@@ -211,22 +211,22 @@ class Framer:
         self.bad = 0
         self.unknown = 0
         self.skipped_bytes = 0
-        self._rest = b""
+        self.rest = b""
 
     @property
     def pending_bytes(self) -> int:
         """Number of bytes kept for the next call."""
-        return len(self._rest)
+        return len(self.rest)
 
     def feed(self, data: bytes, *, whole: bool = False) -> Sequence[Frame]:
         """Return the frames that ``data`` completes, with a correct checksum (unknown ones: unverified)."""
-        if self._rest:
-            data = self._rest + data
+        if self.rest:
+            data = self.rest + data
         # As ``leading_frames``, without the call: every datagram passes here.
         short = type(data) is bytes and len(data) <= MAX_CACHED_BYTES
         frames, at = _leading(data) if short else _leading.__wrapped__(data)
         if at == len(data):
-            self._rest = b""
+            self.rest = b""
             self.frames += len(frames)
             return frames
         return self._search(data, at, list(frames), whole=whole)
@@ -258,6 +258,6 @@ class Framer:
             resume = size if following is None else following.start()
             self.skipped_bytes += resume - at
             at = resume
-        self._rest = data[at:]
+        self.rest = data[at:]
         self.frames += sum(frame.known for frame in found)
         return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.node import Datagram
 
@@ -18,5 +20,5 @@ class Watcher:
     def begin(self, now: int, node: str, /) -> None:
         self.steps.append((now, node))
 
-    def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        self.events.append((now, node, direction, datagram))
+    def __call__(self, now: int, node: str, direction: Direction, datagrams: Sequence[Datagram], /) -> None:
+        self.events += [(now, node, direction, datagram) for datagram in datagrams]

@@ -59,7 +59,7 @@ def recorded(log: Log, count: int) -> None:
     """So many steps, each with one message."""
     for k in range(count):
         log.begin(10_000 * k, "companion-1")
-        log(10_000 * k, "companion-1", "in", BEAT)
+        log(10_000 * k, "companion-1", "in", [BEAT])
 
 
 def test_a_disk_that_stands_still_is_not_waited_for(tmp_path: Path, patience: None) -> None:

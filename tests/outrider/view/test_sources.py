@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -197,9 +198,10 @@ class Overhears:
             else:
                 self.shown.append((self._flight.truth.latest(), one))
 
-    def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram) -> None:
-        if direction == "out" and datagram.link in ("swarm", "target", "autopilot"):
-            self._ear.arrived.append(datagram.data)
+    def __call__(self, now: int, node: str, direction: Direction, datagrams: Sequence[Datagram]) -> None:
+        for link, data in datagrams:
+            if direction == "out" and link in ("swarm", "target", "autopilot"):
+                self._ear.arrived.append(data)
 
 
 def overheard(of: Any) -> Overhears:

@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
@@ -158,19 +158,20 @@ class _SwarmTap:
     def begin(self, now: int, node: str, /) -> None:
         """Do nothing: the times of steps are not needed."""
 
-    def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        """Log ``datagram`` if it is of the swarm link, or the copies that it holds."""
-        if datagram.link == "copies":
-            copies = unpack(datagram.data)
-            # A backup process that was stopped reads old copies.
-            self._add(copies.time, "in", copies.heard)
-            self._add(copies.time, "out", copies.swarm)
-        elif datagram.link == "swarm":
-            self._add(now, direction, datagram.data)
+    def __call__(self, now: int, node: str, direction: Direction, datagrams: Sequence[Datagram], /) -> None:
+        """Log the ``datagrams`` of the swarm link, and the copies that others hold."""
+        for link, data in datagrams:
+            if link == "copies":
+                copies = unpack(data)
+                # A backup process that was stopped reads old copies.
+                self._add(copies.time, "in", copies.heard)
+                self._add(copies.time, "out", copies.swarm)
+            elif link == "swarm":
+                self._add(now, direction, data)
 
     def _add(self, now: int, direction: Direction, data: bytes) -> None:
         if data:
-            self._log(now, self._name, direction, Datagram("swarm", data))
+            self._log(now, self._name, direction, [Datagram("swarm", data)])
 
 
 class _WhenDeaf:

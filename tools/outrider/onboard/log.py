@@ -5,7 +5,7 @@ If the log cannot be written, or a disk blocks for too long, logging stops for t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from queue import SimpleQueue
@@ -34,12 +34,12 @@ _DISK_BLOCKED: Final = "the disk does not respond"
 
 
 class _Entry(NamedTuple):
-    """Arguments of one call of the observer; ``datagram`` is None at the beginning of a step."""
+    """Arguments of one call of the observer; ``datagrams`` is None at the beginning of a step."""
 
     now: int
     node: str
     direction: Direction
-    datagram: Datagram | None
+    datagrams: Sequence[Datagram] | None
 
 
 class Log:
@@ -83,9 +83,9 @@ class Log:
         """Record that a step of ``node`` begins at ``now`` (µs)."""
         self._add(_Entry(now, node, "in", None))
 
-    def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        """Record a datagram that ``node`` receives or sends at ``now`` (µs)."""
-        self._add(_Entry(now, node, direction, datagram))
+    def __call__(self, now: int, node: str, direction: Direction, datagrams: Sequence[Datagram], /) -> None:
+        """Record datagrams that ``node`` receives or sends at ``now`` (µs)."""
+        self._add(_Entry(now, node, direction, datagrams))
 
     def _add(self, entry: _Entry) -> None:
         if self._ended:
@@ -107,11 +107,11 @@ class Log:
             with ExitStack() as files:
                 recorder = Recorder(self._directory, [self._system], files)
                 while (batch := self._waiting.get()) is not None:
-                    for now, node, direction, datagram in batch:
-                        if datagram is None:
+                    for now, node, direction, datagrams in batch:
+                        if datagrams is None:
                             recorder.begin(now, node)
                         else:
-                            recorder(now, node, direction, datagram)
+                            recorder(now, node, direction, datagrams)
         except (OSError, LogError) as error:
             self._end(error)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -38,10 +39,13 @@ class TransmitStatistics:
     def begin(self, now: int, node: str, /) -> None:
         """Do nothing; the protocol of taps requires this method."""
 
-    def __call__(self, now: int, node: str, direction: Direction, datagram: Datagram, /) -> None:
-        """Count the frames of an outgoing datagram, and check its set-points."""
-        if direction != "out":
-            return
+    def __call__(self, now: int, node: str, direction: Direction, datagrams: Sequence[Datagram], /) -> None:
+        """Count the frames of outgoing datagrams, and check their set-points."""
+        if direction == "out":
+            for datagram in datagrams:
+                self._count(now, datagram)
+
+    def _count(self, now: int, datagram: Datagram) -> None:
         for frame in leading_frames(datagram.data)[0]:
             self.messages[datagram.link] += 1
             if frame.message_id == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:

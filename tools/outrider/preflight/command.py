@@ -6,7 +6,7 @@ import json
 import os
 import secrets
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -247,7 +247,7 @@ def run(
     clock: Clock,
     period: int,
     look: Callable[[int], None] = lambda _: None,
-    tap: Callable[[int, str, Direction, Datagram], None] | None = None,
+    tap: Callable[[int, str, Direction, Sequence[Datagram]], None] | None = None,
 ) -> Verdict:
     """Step ``node`` every ``period`` (µs) over its ``links`` until it is over; return the verdict.
 
@@ -270,10 +270,8 @@ def run(
             for datagram in leaving:
                 links[datagram.link].send(datagram.data)
             if tap is not None:
-                for one in inbox:
-                    tap(at, names.companion(node.system), "in", one)
-                for one in leaving:
-                    tap(at, names.companion(node.system), "out", one)
+                tap(at, names.companion(node.system), "in", inbox)
+                tap(at, names.companion(node.system), "out", leaving)
             watch(node.doing, node.share)
             now = max(now + period, clock.now())
             clock.wait_until(now)

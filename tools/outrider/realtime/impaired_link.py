@@ -58,8 +58,8 @@ class ImpairedLink:
         for tap in taps:
             tap.begin(now, self.name)
             for direction, box in boxes:
-                for datagram in box:
-                    tap(now, self.name, direction, datagram)
+                if box:
+                    tap(now, self.name, direction, box)
 
     def _sender(self, datagram: Datagram) -> str:
         """Return the name of the node with the system id in the header."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -34,9 +34,9 @@ class Recorder:
         if steps is not None:
             steps.add(now)
 
-    def __call__(self, now: int, node: str, _direction: Direction, datagram: Datagram, /) -> None:
-        """Write a datagram of ``node`` to its tlog."""
+    def __call__(self, now: int, node: str, _direction: Direction, datagrams: Sequence[Datagram], /) -> None:
+        """Write the datagrams of ``node`` to its tlog."""
         writer = self._writers.get(node)
         if writer is not None:
-            link, data = datagram
-            writer.write(now, names.LINK_NUMBERS[link], data)
+            numbers = names.LINK_NUMBERS
+            writer.write_all(now, [(numbers[link], data) for link, data in datagrams])
