@@ -39,7 +39,7 @@ schemas: .venv/.made  ## write config/schemas anew after a change of a configura
 
 requirements:  ## write uv.lock and requirements.txt anew after a change of dependencies; needs uv
 	@uv lock
-	@uv export --locked --extra sitl --extra export --extra view --extra cluster --group dev --no-emit-project --no-header --no-annotate --quiet \
+	@uv export --locked --extra sitl --extra export --extra view --extra cluster --extra gym --extra pandas --group dev --no-emit-project --no-header --no-annotate --quiet \
 		--format requirements-txt --output-file requirements.txt
 	@for client in $(basename $(wildcard $(CLIENTS)/*.in)); do \
 		uv pip compile --universal --no-deps --generate-hashes --python-version 3.11 --no-header --no-annotate --quiet \
