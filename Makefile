@@ -6,7 +6,7 @@ BIN = .venv/bin
 SCRIPTS = tools/bootstrap.py tools/client_environments.py tools/extract_log.py
 CLIENTS = tests/clients/requirements
 
-.PHONY: fly test slow trial soak lint bench schemas requirements clean
+.PHONY: fly test slow trial soak lint bench schemas docs requirements clean
 .DEFAULT_GOAL := fly
 
 fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--method tangential …"
@@ -36,6 +36,9 @@ bench: .venv/.made  ## measure this machine
 
 schemas: .venv/.made  ## write config/schemas anew after a change of a configuration model
 	@$(BIN)/python -m outrider.schemas config/schemas
+
+docs: .venv/.made  ## write the reference pages in docs anew: Python interface, settings
+	@$(BIN)/python -m reference
 
 requirements:  ## write uv.lock and requirements.txt anew after a change of dependencies; needs uv
 	@uv lock

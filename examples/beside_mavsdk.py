@@ -1,6 +1,6 @@
 """A companion beside a MAVSDK script: the script flies the target, the companion escorts it.
 
-Needs ``pip install mavsdk``, and ``outrider`` on the path. Two simulated ArduCopters: MAVSDK flies the first
+Needs ``pip install 'mavsdk<4'``. Two simulated ArduCopters are started: MAVSDK flies the first
 and knows nothing of the second. `outrider fly` reads where the first is from its telemetry, and leads the
 second around it. With real vehicles only the addresses change (docs/fly.md).
 """
@@ -58,9 +58,11 @@ async def main() -> None:
             processes.append(simulation)
             simulation.stdout.readline()  # one line of JSON when the vehicle is up
         companion = subprocess.Popen(
-            ["outrider", "fly", "--config", "ardupilot", "--system", "1", "--go", "--json", "--seconds", "60"]
-            + ["--autopilot", f"tcp:127.0.0.1:{ESCORT}", "--swarm", f"udpin:127.0.0.1:{TELEMETRY}"]
-            + ["--out", tempfile.mkdtemp(prefix="outrider-")],
+            [
+                *("outrider", "fly", "--config", "ardupilot", "--system", "1", "--go", "--json"),
+                *("--autopilot", f"tcp:127.0.0.1:{ESCORT}", "--swarm", f"udpin:127.0.0.1:{TELEMETRY}"),
+                *("--seconds", "60", "--out", tempfile.mkdtemp(prefix="outrider-")),
+            ],
             stdout=subprocess.PIPE,
             text=True,
         )
@@ -68,7 +70,8 @@ async def main() -> None:
         await asyncio.wait_for(fly_target(drone), 120.0)
         said = await asyncio.to_thread(companion.communicate)
         summary = json.loads(said[0].splitlines()[-1])
-        print({key: summary[key] for key in list(summary)[:8]})
+        phases = ", ".join(one["phase"] for one in summary["phases"])
+        print(f"the companion of vehicle {summary['system']}: {phases}; then it {summary['last_word']}")
     finally:
         for process in reversed(processes):
             process.terminate()

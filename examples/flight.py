@@ -2,9 +2,7 @@
 
 import outrider
 
-flight = outrider.fly(
-    "antipodal-8", seed=3, vehicles=4, sensors="rtk", companion={"methods": ["tangential"]}
-)
+flight = outrider.fly("antipodal-8", seed=3, vehicles=4, sensors="rtk", companion={"methods": ["tangential"]})
 print(flight)
 print(f"converged after {flight.summary['convergence_time_s']} s")
 speeds = (flight.velocities**2).sum(axis=-1) ** 0.5  # (T, K), m/s

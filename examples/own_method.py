@@ -37,4 +37,4 @@ def furthest_left(methods):
 
 
 print(f"without the method: {furthest_left([]):.2f} m to the left")
-print(f"with it:            {furthest_left([KeepLeftOf(0.0, 0.0, 6.0, 12.0)]):.2f} m to the left")
+print(f"with it:            {furthest_left([KeepLeftOf(0.0, 0.0, 5.0, 10.0)]):.2f} m to the left")

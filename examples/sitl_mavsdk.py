@@ -1,6 +1,6 @@
 """The simulated autopilot, flown by MAVSDK-Python 3: take off, fly a velocity, land.
 
-Needs ``pip install mavsdk``, and ``outrider`` on the path. MAVSDK takes the simulation for a PX4 vehicle.
+Needs ``pip install 'mavsdk<4'``, and ``outrider`` on the path. MAVSDK takes the simulation for a PX4 vehicle.
 """
 
 import asyncio
