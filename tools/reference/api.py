@@ -101,7 +101,7 @@ def _signature(value: Any, *, bound: bool = False) -> str:
         if one.kind is one.KEYWORD_ONLY and not starred:
             parts.append("*")
             starred = True
-        mark = {one.VAR_POSITIONAL: "*", one.VAR_KEYWORD: "**"}.get(one.kind, "")
+        mark = "*" * ((one.kind is one.VAR_POSITIONAL) + 2 * (one.kind is one.VAR_KEYWORD))
         default = "" if one.default is one.empty else f" = {one.default!r}"
         parts.append(f"{mark}{one.name}: {_annotation(one.annotation)}{default}")
     answer = "" if found.return_annotation in (found.empty, None, "None") else found.return_annotation

@@ -20,7 +20,7 @@ def swapped(vectors: FloatArray) -> FloatArray:
 
 def forward_left_up(rates: FloatArray) -> FloatArray:
     """Return body vectors (…, 3) forward-left-up for those forward-right-down, and the other way round."""
-    return rates * np.array([1.0, -1.0, -1.0])
+    return np.asarray(rates * np.array([1.0, -1.0, -1.0]))
 
 
 def enu_attitudes(attitudes: FloatArray) -> FloatArray:
