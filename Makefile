@@ -6,7 +6,7 @@ BIN = .venv/bin
 SCRIPTS = tools/bootstrap.py tools/client_environments.py tools/extract_log.py
 CLIENTS = tests/clients/requirements
 
-.PHONY: fly test slow trial soak lint bench schemas requirements clean
+.PHONY: fly test slow trial soak lint bench schemas docs requirements clean
 .DEFAULT_GOAL := fly
 
 fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--method tangential …"
@@ -37,9 +37,12 @@ bench: .venv/.made  ## measure this machine
 schemas: .venv/.made  ## write config/schemas anew after a change of a configuration model
 	@$(BIN)/python -m outrider.schemas config/schemas
 
+docs: .venv/.made  ## write the reference pages in docs anew: Python interface, settings
+	@$(BIN)/python -m reference
+
 requirements:  ## write uv.lock and requirements.txt anew after a change of dependencies; needs uv
 	@uv lock
-	@uv export --locked --extra sitl --extra export --extra view --extra cluster --group dev --no-emit-project --no-header --no-annotate --quiet \
+	@uv export --locked --extra sitl --extra export --extra view --extra cluster --extra gym --extra pandas --group dev --no-emit-project --no-header --no-annotate --quiet \
 		--format requirements-txt --output-file requirements.txt
 	@for client in $(basename $(wildcard $(CLIENTS)/*.in)); do \
 		uv pip compile --universal --no-deps --generate-hashes --python-version 3.11 --no-header --no-annotate --quiet \

@@ -59,7 +59,11 @@ def with_uv(uv: str) -> None:
     """Make .venv with uv, which finds or downloads a Python and shows its own progress."""
     say("setting up .venv with uv")
     environment = dict(os.environ, UV_PROJECT_ENVIRONMENT=VENV)
-    extras = [word for extra in ("sitl", "export", "view", "cluster") for word in ("--extra", extra)]
+    extras = [
+        word
+        for extra in ("sitl", "export", "view", "cluster", "gym", "pandas")
+        for word in ("--extra", extra)
+    ]
     command = [uv, "sync", "--locked", *extras, "--project", ROOT]
     if subprocess.call(command, stdin=subprocess.DEVNULL, env=environment) != 0:
         raise SetupError("uv sync failed, see above")

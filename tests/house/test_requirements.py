@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LOCK = tomllib.loads((ROOT / "uv.lock").read_text(encoding="utf-8"))
 CLIENTS = sorted((ROOT / "tests" / "clients" / "requirements").glob("*.txt"))
-EXTRAS, GROUPS = ("sitl", "export", "view", "cluster"), ("dev",)
+EXTRAS, GROUPS = ("sitl", "export", "view", "cluster", "gym", "pandas"), ("dev",)
 
 
 class Pin(NamedTuple):

@@ -14,10 +14,10 @@ from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.resources import config_root, find
 from outrider.runs.summary import Cost, Value, summarise
+from outrider.scenarios.changes import merged
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.conductor import Stage
 from outrider.simulation.flight import Flight
-from outrider.testing.scenes import merged
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from outrider.resources import find
+from outrider.scenarios.changes import merged
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.scenarios.options import Options, apply
 from outrider.scenarios.scenario import Scenario
-from outrider.testing.scenes import merged
 from outrider.yaml_files.yaml_file import load
 from tests.scenarios.lockstep_flights import fly, setpoints
 

@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 
 from outrider.resources import config_root, find
+from outrider.scenarios.changes import merged
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.flight import Flight
 from outrider.terminal.share_progress import share_progress
-from outrider.testing.scenes import merged
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
-
-from pydantic import ValidationError
 
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import InputError
 from outrider.resources import find
-from outrider.scenarios.scenario import Scenario
+from outrider.scenarios.changes import changed
 from outrider.shadow.roles import Roles, check, survey
 from outrider.shadow.shadow_run import shadow_flight
 from outrider.simulation.preparation import Prepared
@@ -53,35 +50,3 @@ def replayed(
         raise InputError(str(error)) from None
     check(log, cast, seen)
     return Replayed(f"{log.name}, vehicle {own}", shadow_flight(config, cast, seen, read_tlog(log)), golden)
-
-
-def changed(name: str, changes: dict[str, Any]) -> Scenario:
-    """Return a scenario, by name or file, with ``changes`` merged in, mapping by mapping.
-
-    Raises InputError for invalid changes.
-    """
-    document = merged(load(find("scenarios", name), Scenario).model_dump(), changes)
-    try:
-        return Scenario.model_validate(document)
-    except ValidationError as error:
-        faults = [f"{'.'.join(map(str, one['loc'])) or name}: {one['msg']}" for one in error.errors()]
-        raise InputError(*(f"{name}, changed: {fault}" for fault in faults)) from None
-
-
-def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Return ``base`` with ``changes`` merged in.
-
-    Two mappings under the same key are merged, too, unless the new one names another ``kind``.
-    """
-    result = deepcopy(base)
-    for key, value in changes.items():
-        inner = result.get(key)
-        # A mapping of another kind has other keys, so it replaces the old one.
-        if (
-            isinstance(inner, dict)
-            and isinstance(value, dict)
-            and value.get("kind", inner.get("kind")) == inner.get("kind")
-        ):
-            value = merged(inner, value)
-        result[key] = value
-    return result

@@ -1,0 +1,51 @@
+"""Check of arrays from outside: shape, finite values, and one error that names the argument and its unit."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from companion.values.horizon import Array
+from outrider.errors import InputError
+
+
+def checked(name: str, value: ArrayLike, shape: tuple[int | str, ...], unit: str) -> Array:
+    """Return a read-only copy of ``value`` as float64 of ``shape``; a text in ``shape`` stands for any size.
+
+    Raises InputError with ``name``, what was given, and the shape and ``unit`` that are allowed.
+    """
+    wanted = f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''}), {unit}"
+    try:
+        found = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: is no array of numbers; allowed: shape {wanted}") from None
+    fits = found.ndim == len(shape) and all(
+        isinstance(size, str) or size == given for size, given in zip(shape, found.shape, strict=True)
+    )
+    if not fits:
+        raise InputError(f"{name}: has shape {found.shape}; allowed: {wanted}")
+    if not np.isfinite(found).all():
+        raise InputError(f"{name}: holds a value that is not finite; allowed: finite numbers, {unit}")
+    found.flags.writeable = False
+    return found
+
+
+def number(name: str, value: float, unit: str, *, least: float | None = None) -> float:
+    """Return ``value`` if it is a finite number of at least ``least``; otherwise raise InputError."""
+    bound = "" if least is None else f" of at least {least:g}"
+    allowed = f"allowed: a finite number{bound}, {unit}"
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
+        raise InputError(f"{name}: is no number; {allowed}")
+    found = float(value)
+    if not isfinite(found) or (least is not None and found < least):
+        raise InputError(f"{name}: is {found:g}; {allowed}")
+    return found
+
+
+def system_id(name: str, value: int) -> int:
+    """Return ``value`` if it is a vehicle's id, 1 to 255; otherwise raise InputError."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= 255:
+        raise InputError(f"{name}: is {value!r}; allowed: a whole number from 1 to 255")
+    return int(value)
