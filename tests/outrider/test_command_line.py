@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
+import outrider
 from outrider.errors import InputError, OutriderError
 from outrider.simulation.flight import Flight
 from outrider.swarm import command as swarm
@@ -259,4 +260,35 @@ def test_a_goal_that_is_not_reached_ends_with_1_and_a_table(run: Run, tmp_path: 
     assert (ended.status, ended.err) == (1, "")
     assert "antipodal-8 · tangential · seed 3" in ended.out
     assert "{" not in ended.out
-    assert [path.name for path in (tmp_path / "runs").iterdir()] == ["antipodal-8-tangential-seed3"]
+    assert [path.name for path in (tmp_path / "runs").iterdir()] == [
+        "antipodal-8-tangential-planar-replan10-seed3"
+    ]
+
+
+# Conventions
+
+
+def test_the_version_and_short_help(run: Run) -> None:
+    assert run("--version").out == f"outrider {outrider.__version__}\n"
+    for words in ((), ("swarm",), ("list",)):
+        assert run(*words, "-h").out == run(*words, "--help").out
+
+
+def test_help_breaks_no_sentence(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "300")
+    assert (
+        "send the same messages again? Exits with 1 if not, or if there are findings."
+        in run("replay", "-h").out
+    )
+
+
+def test_names_are_completed_in_a_shell(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_OUTRIDER_COMPLETE", "complete_bash")
+    for words, wanted in (
+        ("outrider swarm antipodal-", ["antipodal-16", "antipodal-8"]),
+        ("outrider sweep smo", ["smoke"]),
+        ("outrider repl", ["replay"]),
+    ):
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+        assert run().out.split() == wanted

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
-from typing import Final, cast
+from collections.abc import Callable
+from typing import Annotated, Final, cast
 
 import typer
 
 from outrider.commands.campaigns import gallery, paper, sweep
+from outrider.commands.finding import listing, new
 from outrider.commands.flying import doctor, fly, preflight, sitl, swarm
 from outrider.commands.machine import bench, key
 from outrider.commands.reading import export, replay, report, view
 from outrider.errors import InputError, OutriderError
 
+_HELP: Final = {"help_option_names": ["-h", "--help"]}
 app = typer.Typer(
-    add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    context_settings=_HELP,
     help="A ring of MAVs escorts a moving target without colliding.",
 )
 BAD_INPUT, FAULT = 2, 3
@@ -36,9 +40,29 @@ _EXTRAS: Final = {
 _UsageError: Final = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 
 
+def _show_version(wanted: bool) -> None:
+    """Print the version and end."""
+    if wanted:
+        from outrider import __version__
+
+        sys.stdout.write(f"outrider {__version__}\n")
+        raise typer.Exit
+
+
 @app.callback()
-def _root() -> None:
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True),
+    ] = False,
+) -> None:
     """Make typer treat every command as a sub-command."""
+
+
+def _help_of(command: Callable[..., None]) -> str:
+    """Return the description of a command with each paragraph in one line, which the terminal then wraps."""
+    paragraphs = (inspect.getdoc(command) or "").split("\n\n")
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
 for _command in (
@@ -56,8 +80,10 @@ for _command in (
     report,
     key,
     bench,
+    new,
 ):
-    app.command()(_command)
+    app.command(help=_help_of(_command), context_settings=_HELP)(_command)
+app.command("list", help=_help_of(listing), context_settings=_HELP)(listing)
 
 
 def main() -> None:
@@ -70,7 +96,7 @@ def main() -> None:
     from mavlink_bridge.errors import BridgeError
 
     try:
-        status = app(standalone_mode=False)
+        status = app(prog_name="outrider", standalone_mode=False)
     except InputError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(BAD_INPUT)

@@ -7,11 +7,14 @@ from typing import Annotated, Literal
 
 import typer
 
-from outrider.commands.options import AsJson, Begun, Jobs
+from outrider.commands.options import AsJson, Begun, Jobs, shipped
 
 
 def sweep(
-    name: Annotated[str, typer.Argument(help="A file, or the name of a shipped sweep.")],
+    name: Annotated[
+        str,
+        typer.Argument(help="A file, or the name of a shipped sweep.", autocompletion=shipped("sweeps")),
+    ],
     runs: Annotated[int | None, typer.Option(min=1, max=1_000_000, help="Seeds per cell.")] = None,
     jobs: Jobs = None,
     out: Begun = None,

@@ -20,11 +20,17 @@ from outrider.commands.options import (
     RunDirectory,
     SigningKey,
     Wind,
+    shipped,
 )
 
 
 def swarm(
-    scenario: Annotated[str, typer.Argument(help="A file, or the name of a shipped scenario.")],
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="A file, or the name of a shipped scenario.", autocompletion=shipped("scenarios")
+        ),
+    ],
     method: Annotated[str | None, typer.Option(help=METHODS)] = None,
     avoidance: Annotated[str | None, typer.Option(help="field or certified.")] = None,
     planar: Annotated[bool, typer.Option("--planar", help="Fix the height, as the paper.")] = False,
@@ -64,7 +70,7 @@ def swarm(
     from outrider.errors import Fault, InputError
     from outrider.report.command import NAME, make, write
     from outrider.runs.summary import exit_status
-    from outrider.scenarios.options import Options
+    from outrider.scenarios.options import Options, named
     from outrider.simulation.console import progress, show
     from outrider.simulation.preparation import prepare
     from outrider.swarm import command as flying
@@ -94,7 +100,7 @@ def swarm(
             from outrider.swarm.show import showing
 
             shown = open_.enter_context(showing())
-        directory = flying.run_directory(out, prepared.scenario, seed)
+        directory = flying.run_directory(out, prepared.scenario, seed, named(options))
         with progress(prepared.scenario.duration_s) as watch:
             pace = flying.Pace(real_time or realtime, realtime, processes)
             summary = flying.fly(prepared, seed, directory, watch, pace, shown)
@@ -279,7 +285,9 @@ def fly(
         str,
         typer.Option(help="udpin:HOST:PORT, tcp:HOST:PORT, /dev/…,BAUD, …; tlog:PATH to rehearse."),
     ],
-    config: Annotated[str, typer.Option(help="A file, or ardupilot, px4.")],
+    config: Annotated[
+        str, typer.Option(help="A file, or ardupilot, px4.", autocompletion=shipped("companions"))
+    ],
     swarm: Annotated[str | None, typer.Option(help="Endpoint of the other companions.")] = None,
     target: Annotated[
         str | None, typer.Option(help="Endpoint of the target; by default the swarm's.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -11,6 +12,19 @@ METHODS: Final = "baseline, swivel, approach_angle, tangential; joined by +."
 SENSORS: Final = "truth, rtk, gnss, or sih: as PX4's own simulation."
 PHYSICS: Final = "own or jsbsim."
 RESPONSE: Final = "exact: at its set-points; firmware: flown by the firmware's position controller."
+
+
+def shipped(kind: str) -> Callable[[str], list[str]]:
+    """Return the completion of the names of shipped files of ``kind``, a folder of the configuration."""
+
+    def complete(incomplete: str) -> list[str]:
+        from outrider.resources import config_root
+
+        names = sorted(path.stem for path in (config_root() / kind).glob("*.yaml"))
+        return [name for name in names if name.startswith(incomplete)]
+
+    return complete
+
 
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
 Begun = Annotated[Path | None, typer.Option(help="Directory; what was begun there is continued.")]

@@ -10,14 +10,11 @@ from typing import Any
 
 from outrider.errors import InputError
 from outrider.flights.flight import Flight
-from outrider.resources import find
 from outrider.runs.directories import new_directory
 from outrider.scenarios.changes import changed
 from outrider.scenarios.scenario import Scenario
-from outrider.simulation.preparation import Prepared
+from outrider.simulation.preparation import prepared
 from outrider.swarm import command as swarm
-from outrider.yaml_files.yaml_file import load
-from sitl.vehicle.config import VehicleConfig
 
 
 def scenario(name: str | Path, **changes: Any) -> Scenario:
@@ -52,12 +49,12 @@ def fly(
         of = scenario
     else:
         of = changed(str(scenario), changes)
-    prepared = Prepared(of, load(find("vehicles", of.vehicle), VehicleConfig))
+    ready = prepared(of, of.name)
     temporary = out is None
     directory = Path(tempfile.mkdtemp(prefix="outrider-")) if out is None else new_directory(Path(out), "")
     try:
         pace = swarm.Pace(processes=processes)
-        swarm.fly(prepared, seed, directory, lambda _stage, _seconds: None, pace)
+        swarm.fly(ready, seed, directory, lambda _stage, _seconds: None, pace)
     except BaseException:
         if temporary:
             shutil.rmtree(directory, ignore_errors=True)

@@ -16,9 +16,16 @@ MOST_SHOWN, MOST_BESIDE = 30, 12
 """Maximum numbers of rows and of systems in the table of rates; JSON has all."""
 
 
+_FILE_WIDTH = 400
+"""Number of columns where output is no terminal."""
+
+
 def show(name: str, census: Census) -> None:
     """Print the log as tables: the log as a whole, its systems, and the rate of each message."""
     console = Console()
+    if not console.is_terminal:
+        # In a file or a pipe nothing is cut: who reads it may have any width.
+        console = Console(width=_FILE_WIDTH)
     # Above the table, where a long name is not broken.
     console.print(Text(name), soft_wrap=True)
     for table in (_whole(census), _people(census)):
@@ -56,7 +63,7 @@ def _whole(census: Census) -> Table:
 def _people(census: Census) -> Table:
     table = Table()
     for column in ("system", "components", "what", "MAVLink", "links", "messages", "from – to, s", "gaps"):
-        table.add_column(column)
+        table.add_column(column, overflow="fold")
     for vehicle in census.vehicles:
         times = [(time - census.start) / MILLION for time in (vehicle.first, vehicle.last)]
         table.add_row(
@@ -82,9 +89,9 @@ def _breaks(vehicle: Vehicle) -> str:
 def _often(vehicles: Sequence[Vehicle], names: Sequence[str]) -> Table:
     """Return the table of rates: a row for each message, a column for each system."""
     table = Table(title="messages per second")
-    table.add_column("")
+    table.add_column("", no_wrap=True, min_width=max(map(len, names), default=0))
     for vehicle in vehicles:
-        table.add_column(str(vehicle.system), justify="right")
+        table.add_column(str(vehicle.system), justify="right", no_wrap=True)
     columns = [rates(vehicle) for vehicle in vehicles]
     for name in names:
         table.add_row(name, *(f"{hz[name]:.3g}" if name in hz else "" for hz in columns))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import isfinite
 from typing import NamedTuple, get_args
 
@@ -91,6 +92,31 @@ def apply(scenario: Scenario, options: Options) -> Scenario:
         # An option may change several links; their equal errors are reported once.
         faults = dict.fromkeys(_fault(one, options) for one in error.errors())
         raise InputError(*faults) from None
+
+
+def named(options: Options) -> str:
+    """Return the options, except method and avoidance, as part of a file name: ``loss0.2-delay100``.
+
+    It is empty without such options.
+    """
+    said = {
+        "planar": "planar" if options.planar else None,
+        "vehicles": options.vehicles,
+        "loss": options.loss,
+        "delay": options.delay_ms,
+        "": options.sensors,
+        "replan": options.replan_hz,
+        "wind": options.wind,
+        "physics": options.physics,
+        "flavour": options.flavour,
+        "response": options.response,
+    }
+    parts = []
+    for word, value in said.items():
+        if value is not None:
+            text = f"{value:g}" if isinstance(value, float) else str(value)
+            parts.append(text if word in ("", "planar", "physics", "flavour", "response") else word + text)
+    return re.sub(r"[^A-Za-z0-9._-]", "_", "-".join(parts))
 
 
 def _fault(error: ErrorDetails, options: Options) -> str:

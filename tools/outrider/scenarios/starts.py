@@ -33,10 +33,9 @@ def starts(scenario: Scenario, seed: int, planar: bool) -> Starts:
     to the place before jitter. The result depends on ``scenario``, ``seed`` and ``planar`` alone.
     """
     config, count = scenario.starts, scenario.vehicles
-    slots, goals = _slots(scenario)
+    slots, goals = places(scenario)
     jitter = np.full(scenario.size, config.jitter)
     if scenario.bystanders:
-        slots = np.vstack([slots, [other.at for other in scenario.bystanders]])
         jitter[count:] = [other.jitter for other in scenario.bystanders]
     random = stream(seed, Stream.STARTS)
     direction = random.normal(size=(scenario.size, 3))
@@ -45,6 +44,14 @@ def starts(scenario: Scenario, seed: int, planar: bool) -> Starts:
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     radius = jitter[:, None] * np.cbrt(random.uniform(size=(scenario.size, 1)))
     return Starts(slots + direction * radius, goals)
+
+
+def places(scenario: Scenario) -> tuple[Array, Array | None]:
+    """Return the starts (K, 3) before jitter, bystanders last, and the goals (vehicles, 3) or None, m."""
+    slots, goals = _slots(scenario)
+    if scenario.bystanders:
+        slots = np.vstack([slots, [other.at for other in scenario.bystanders]])
+    return slots, goals
 
 
 def _slots(scenario: Scenario) -> tuple[Array, Array | None]:

@@ -12,9 +12,13 @@ from rich.table import Table
 
 from outrider.runs.summary import Value
 from outrider.simulation.conductor import Stage
+from outrider.terminal.lines import say
 from outrider.terminal.progress_lines import ProgressLines
+from outrider.terminal.time_left import TimeLeft, duration
 
 _REFRESH_S = 0.1
+_LONG_S = 180.0
+"""Wall time (s) of a flight from which on it is announced."""
 _WORDS = {
     "converged": "converged",
     "convergence_time_s": "convergence time, s",
@@ -60,25 +64,45 @@ def progress(duration_s: float) -> Iterator[Callable[[Stage, float], None]]:
         BarColumn(),
         TextColumn("{task.fields[seconds]:6.1f} s simulated"),
         TimeElapsedColumn(),
+        TextColumn("{task.fields[left]}"),
     )
     console = Console(stderr=True)
     off = not console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=off, auto_refresh=False) as bar:
-        task = bar.add_task(Stage.PREPARE.value, total=duration_s, seconds=0.0)
+        task = bar.add_task(Stage.PREPARE.value, total=duration_s, seconds=0.0, left="")
         shown = 0.0
-        lines = ProgressLines()
+        lines, time_left, warned = ProgressLines(), TimeLeft(), False
+
+        def left(stage: Stage, seconds: float) -> str:
+            """Return how long the flight takes at most, and say so at once if that is long."""
+            nonlocal warned
+            if stage is not Stage.CLOCK:
+                return ""
+            words, most = time_left.words(seconds / duration_s), time_left.seconds(seconds / duration_s)
+            if most is not None and most > _LONG_S and not warned:
+                warned = True
+                say(f"this flight takes up to {duration(most)}; less if its goal is reached earlier")
+            return words
 
         def watch(stage: Stage, seconds: float) -> None:
             nonlocal shown
-            if off:
-                lines.say(lambda: f"{stage.value}: {seconds:.1f} s simulated")
-                return
             now = time.monotonic()
             if now - shown < _REFRESH_S:
                 return
             shown = now
+            rest = left(stage, seconds)
+            if off:
+                lines.say(lambda: f"{stage.value}: {seconds:.1f} s simulated{rest and ', at most ' + rest}")
+                return
             done = min(seconds, duration_s) if stage is not Stage.PREPARE else 0.0
-            bar.update(task, description=f"{stage.value:9}", completed=done, seconds=seconds, refresh=True)
+            bar.update(
+                task,
+                description=f"{stage.value:9}",
+                completed=done,
+                seconds=seconds,
+                left=rest,
+                refresh=True,
+            )
 
         yield watch
 

@@ -11,6 +11,7 @@ from outrider.resources import config_root, find
 from outrider.runs.outcome import Outcome
 from outrider.runs.summary import WALL_FIELDS, Cost, Value, summarise
 from outrider.scenarios.faults import MotorFailure
+from outrider.scenarios.feasibility import obstacles_to
 from outrider.scenarios.options import Options, apply
 from outrider.scenarios.scenario import RecordedTarget, Scenario
 from outrider.simulation.flight import Flight
@@ -29,10 +30,18 @@ class Prepared(NamedTuple):
 def prepare(name: str, options: Options) -> Prepared:
     """Load a scenario by name or path and apply ``options``.
 
-    Raises InputError for a faulty file or option, ModuleNotFoundError if ``jsbsim`` is required and missing.
+    Raises InputError for a faulty file or option, and as ``prepared`` does.
     """
     path = find("scenarios", name)
-    scenario = apply(load(path, Scenario), options)
+    return prepared(apply(load(path, Scenario), options), str(path))
+
+
+def prepared(scenario: Scenario, where: str) -> Prepared:
+    """Return ``scenario`` with its vehicle, checked; faults are reported under the name ``where``.
+
+    Raises InputError for a scenario that cannot be flown, ModuleNotFoundError if ``jsbsim`` is required and
+    missing.
+    """
     if isinstance(scenario.target, RecordedTarget):
         # Before a run directory is made: an unusable log then leaves none behind.
         origin = scenario.origin
@@ -44,10 +53,11 @@ def prepare(name: str, options: Options) -> Prepared:
     vehicle = load(find("vehicles", scenario.vehicle), VehicleConfig)
     last = len(vehicle.rotors) - 1
     wrong = [
-        Fault(str(path), f"faults[{index}].rotor is {fault.rotor}; {scenario.vehicle} has rotors 0 to {last}")
+        Fault(where, f"faults[{index}].rotor is {fault.rotor}; {scenario.vehicle} has rotors 0 to {last}")
         for index, fault in enumerate(scenario.faults)
         if isinstance(fault, MotorFailure) and fault.rotor > last
     ]
+    wrong += [Fault(where, reason) for reason in obstacles_to(scenario, vehicle.span)]
     if wrong:
         raise InputError(*wrong)
     return Prepared(scenario, vehicle)

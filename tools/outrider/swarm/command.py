@@ -131,11 +131,12 @@ def _cpu_of_all() -> float:
     return times.user + times.system + times.children_user + times.children_system
 
 
-def run_directory(out: Path | None, scenario: Scenario, seed: int) -> Path:
-    """Return a new, empty directory: ``out``, or the first free ``runs/NAME-METHOD-seedN[-k]``.
+def run_directory(out: Path | None, scenario: Scenario, seed: int, changes: str = "") -> Path:
+    """Return a new, empty directory: ``out``, or the first free ``runs/NAME-METHOD[-CHANGES]-seedN[-k]``.
 
     Nothing is overwritten. Raises InputError if ``out`` is not empty.
     """
     certified = scenario.companion.avoidance == "certified"
     way = "certified" if certified else "+".join(scenario.companion.methods)
-    return new_directory(out, f"{scenario.name}-{way}-seed{seed}")
+    changed = f"-{changes}" if changes else ""
+    return new_directory(out, f"{scenario.name}-{way}{changed}-seed{seed}")

@@ -8,27 +8,24 @@ from typing import Any
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.log import read_tlog
 from outrider.errors import InputError
-from outrider.resources import find
 from outrider.scenarios.changes import changed
 from outrider.shadow.roles import Roles, check, survey
 from outrider.shadow.shadow_run import shadow_flight
-from outrider.simulation.preparation import Prepared
+from outrider.simulation.preparation import prepared
 from outrider.swarm import command as swarm
 from outrider.testing.flown import Flown, Replayed
 from outrider.testing.golden import Golden
-from outrider.yaml_files.yaml_file import load
-from sitl.vehicle.config import VehicleConfig
 
 
 def flown(scenario: str | Path, seed: int, changes: dict[str, Any], folder: Path, golden: Golden) -> Flown:
     """Fly the changed scenario; the run directory is created in ``folder``."""
     of = changed(str(scenario), changes)
-    vehicle = load(find("vehicles", of.vehicle), VehicleConfig)
+    ready = prepared(of, of.name)
     number = 1
     while (directory := folder / f"{of.name}-{seed}-{number}").exists():
         number += 1
     directory.mkdir()
-    summary = swarm.fly(Prepared(of, vehicle), seed, directory, lambda _stage, _seconds: None)
+    summary = swarm.fly(ready, seed, directory, lambda _stage, _seconds: None)
     return Flown(directory, summary, of.systems, golden)
 
 
