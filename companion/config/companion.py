@@ -59,7 +59,7 @@ class OwnSurface(Settings):
     """Surface of one vehicle."""
 
     vehicle: int = Field(ge=1, le=255, description="system id")
-    surface: SurfaceConfig
+    surface: SurfaceConfig = Field(description="surface around the target for this vehicle")
 
 
 class CompanionConfig(Settings):
@@ -67,15 +67,20 @@ class CompanionConfig(Settings):
 
     model_config = ConfigDict(json_schema_extra={"renamed": {"voice": "ground_messages"}})
 
-    task: Literal["escort", "goto"] = "escort"
-    methods: tuple[MethodName, ...] = ("tangential",)
+    task: Literal["escort", "goto"] = Field(
+        "escort", description="escort: on a surface around the target; goto: to ordered goals"
+    )
+    methods: tuple[MethodName, ...] = Field(
+        ("tangential",),
+        description="methods to leave the field's local minima, in this order; baseline adds nothing",
+    )
     turning_sense: TurningSense = Field(
         "own", description="'own': by approach, as the paper; otherwise one sense for all vehicles"
     )
     avoidance: Avoidance = Field(
         "field", description="'field': the paper's; 'certified': committed plans between moving planes"
     )
-    planar: bool = False
+    planar: bool = Field(False, description="plans keep the height at which they begin, as in the paper")
     shares_plan: bool = Field(True, description="send the flown horizon to the others")
     neighbour_prediction: Literal["held", "velocity"] = Field(
         "held",
@@ -89,7 +94,12 @@ class CompanionConfig(Settings):
     )
     target_source: TargetSource = Field(GlobalPositionSource(), description="source of the target's position")
     target_d_min: float | None = Field(None, gt=0.0, le=100.0, description="the target is an obstacle, m")
-    target_d_safe: float | None = Field(None, gt=0.0, le=100.0)
+    target_d_safe: float | None = Field(
+        None,
+        gt=0.0,
+        le=100.0,
+        description="m: at this distance from the target its force begins; with target_d_min",
+    )
     obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed obstacles")
     moving: tuple[Moving, ...] = Field(
         (), max_length=100, description="senders on the swarm link that are obstacles, and their sizes"
@@ -110,7 +120,9 @@ class CompanionConfig(Settings):
     tangential: TangentialConfig = TangentialConfig()
     swivel: SwivelConfig = SwivelConfig()
     approach_angle: ApproachAngleConfig = ApproachAngleConfig()
-    surface: SurfaceConfig = Circle()
+    surface: SurfaceConfig = Field(
+        Circle(), description="surface around the target on which the destinations lie"
+    )
     surfaces: tuple[OwnSurface, ...] = Field(
         (), max_length=255, description="surfaces of vehicles with a surface of their own"
     )

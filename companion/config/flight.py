@@ -13,9 +13,13 @@ from companion.values.settings import Positive, Settings
 class GuardConfig(Settings):
     """Age limits (µs) of a plan's inputs, and limits beyond which the companion reacts."""
 
-    own_stale_us: Micros = 500_000
+    own_stale_us: Micros = Field(
+        500_000, description="µs: an own position older than this is not planned from"
+    )
     hold_us: Micros = Field(500_000, description="µs: a plan is held for this long after the last new one")
-    target_stale_us: Micros = 3_000_000
+    target_stale_us: Micros = Field(
+        3_000_000, description="µs: a target whose last measurement is older than this is lost"
+    )
     plan_stale_us: Micros = Field(500_000, description="a shared horizon older than this is not used")
     go_keeps_us: int = Field(
         30_000_000,
@@ -98,10 +102,10 @@ class GuardConfig(Settings):
 class RatesConfig(Settings):
     """Periods of the companion's activities, µs."""
 
-    replan_us: Micros = 10_000
-    setpoint_us: Micros = 20_000
-    state_us: Micros = 100_000
-    plan_us: Micros = 100_000
+    replan_us: Micros = Field(10_000, description="µs between plans")
+    setpoint_us: Micros = Field(20_000, description="µs between set-points")
+    state_us: Micros = Field(100_000, description="µs between messages of the own state to the others")
+    plan_us: Micros = Field(100_000, description="µs between messages of the own plan to the others")
 
 
 class TrackingConfig(Settings):
@@ -140,4 +144,6 @@ class GroundMessagesConfig(Settings):
         description="plan time and the like as NAMED_VALUE_FLOAT, once a second; no two flights then send "
         "the same bytes",
     )
-    links: tuple[Literal["ground", "autopilot"], ...] = Field(("ground",), max_length=2)
+    links: tuple[Literal["ground", "autopilot"], ...] = Field(
+        ("ground",), max_length=2, description="links on which these messages are sent"
+    )

@@ -40,9 +40,13 @@ class CostConfig(Settings):
     The paper gives no values: these were determined in flights of the swap and the escort.
     """
 
-    omega_t_position: Positive = 100.0
-    omega_t_velocity: Positive = 40.0
-    omega_i: Positive = 0.5
+    omega_t_position: Positive = Field(
+        100.0, description="Ω_t: weight of the distance from the destination at the end of the horizon (1/m²)"
+    )
+    omega_t_velocity: Positive = Field(
+        40.0, description="weight of the velocity's error at the end of the horizon (s²/m²)"
+    )
+    omega_i: Positive = Field(0.5, description="Ω_i: weight of each acceleration of the plan (s⁴/m²)")
 
 
 class LimitsConfig(Settings):
@@ -52,16 +56,18 @@ class LimitsConfig(Settings):
     of the own position (``field.margin``) from its sides.
     """
 
-    u_max: Bounds = (2.0, 2.0, 2.0)
-    v_max: Bounds = (5.0, 5.0, 5.0)
+    u_max: Bounds = Field(
+        (2.0, 2.0, 2.0), description="m/s² an axis, of the input u without the field's force"
+    )
+    v_max: Bounds = Field((5.0, 5.0, 5.0), description="m/s an axis")
     a_total: float = Field(7.0, gt=0.0, le=30.0, description="m/s²; the firefly at 35° of tilt has 6.9")
     j_max: Bounds | None = Field(
         None,
         description="m/s³ an axis: a hard bound on how fast a plan's acceleration changes; null: none, as the"
         " paper",
     )
-    box_min: Triple = (-20.0, -20.0, 3.0)
-    box_max: Triple = (20.0, 20.0, 10.0)
+    box_min: Triple = Field((-20.0, -20.0, 3.0), description="m, ENU: lowest corner of where vehicles may be")
+    box_max: Triple = Field((20.0, 20.0, 10.0), description="m, ENU: highest corner of where vehicles may be")
 
     @model_validator(mode="after")
     def _box(self) -> LimitsConfig:
@@ -142,7 +148,7 @@ class FieldConfig(Potential):
 class TangentialConfig(Settings):
     """Tangential band, Sec. III-D.3."""
 
-    k_tang: Positive = 2.0
+    k_tang: Positive = Field(2.0, description="gain of the tangential force")
     d_band: Positive = Field(1.0, description="m beyond d_safe; more than v_max·dt + u_max·dt²/2")
     reach_s: float = Field(0.5, ge=0.0, le=5.0, description="the band grows by this times the closing speed")
     d_full: Positive = Field(1.0, description="m, between centres: the force is at its full there")

@@ -34,7 +34,9 @@ class Parametric(Settings):
 
     kind: Literal["parametric"]
     function: str = Field(min_length=1, max_length=200, description=f"an entry point of {GROUP}")
-    parameters: dict[str, float] = Field(default_factory=dict, max_length=20)
+    parameters: dict[str, float] = Field(
+        default_factory=dict, max_length=20, description="numbers that the function gets as keywords"
+    )
 
     @model_validator(mode="after")
     def _usable(self) -> Parametric:

@@ -69,7 +69,9 @@ class CameraConfig(_Settings):
 
     resolution: tuple[_Pixels, _Pixels] = Field((1280, 720), description="pixels: columns, rows")
     field_of_view_deg: float = Field(70.0, ge=1.0, le=170.0, description="degrees, horizontal")
-    mount: Annotated[FixedMount | GimbalMount, Field(discriminator="kind")] = FixedMount(kind="fixed")
+    mount: Annotated[FixedMount | GimbalMount, Field(discriminator="kind")] = Field(
+        FixedMount(kind="fixed"), description="how it is fixed to the vehicle"
+    )
     rate_hz: float = Field(10.0, gt=0.0, le=60.0, description="images per second")
     latency_ms: float = Field(
         100.0, ge=40.0, le=5000.0, description="ms from an image to its message: exposure, detection"

@@ -6,10 +6,15 @@ import re
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel
 
 import outrider
+from companion.config import CompanionConfig
 from outrider import sim
+from outrider.scenarios.scenario import Scenario
 from reference.__main__ import PAGES
+from reference.settings import undescribed
+from sitl.vehicle.config import VehicleConfig
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -27,6 +32,11 @@ def test_its_links_lead_to_its_headings(name: str) -> None:
     }
     for target in re.findall(r"\]\(#([^)]*)\)", text):
         assert target in anchors
+
+
+@pytest.mark.parametrize("model", [CompanionConfig, Scenario, VehicleConfig])
+def test_every_key_is_described(model: type[BaseModel]) -> None:
+    assert undescribed(model) == []
 
 
 def test_every_public_name_is_on_the_page() -> None:

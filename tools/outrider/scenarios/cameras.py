@@ -16,7 +16,7 @@ __all__ = ["CameraConfig", "VehicleCamera", "camera_faults"]
 class VehicleCamera(Part):
     """Camera of one vehicle, in place of the fleet's."""
 
-    vehicle: System
+    vehicle: System = Field(description="system id")
     camera: CameraConfig | None = Field(None, description="complete settings; null: it has none")
 
 

@@ -14,14 +14,14 @@ class _OfVehicle(Part):
 
 
 class _Fault(_OfVehicle):
-    at_s: Seconds
+    at_s: Seconds = Field(description="s after the goal event")
 
 
 class Freeze(_Fault):
     """Freeze of the companion: it computes nothing for a while; input waits as in a socket's buffer."""
 
     kind: Literal["freeze"]
-    for_s: Duration
+    for_s: Duration = Field(description="s that it lasts")
 
 
 class Vanish(_Fault):
@@ -37,22 +37,22 @@ class Restart(_Fault):
     """
 
     kind: Literal["restart"]
-    for_s: Duration
+    for_s: Duration = Field(description="s until the other one begins")
 
 
 class GpsLoss(_Fault):
     """Loss of the autopilot's position fix for a while."""
 
     kind: Literal["gps_loss"]
-    for_s: Duration
+    for_s: Duration = Field(description="s that it lasts")
 
 
 class GpsJump(_Fault):
     """Offset of the autopilot's position fix by ``offset`` (m, ENU) for a while."""
 
     kind: Literal["gps_jump"]
-    for_s: Duration
-    offset: Position
+    for_s: Duration = Field(description="s that it lasts")
+    offset: Position = Field(description="m, ENU")
 
 
 class MotorFailure(_Fault):
@@ -60,7 +60,7 @@ class MotorFailure(_Fault):
 
     kind: Literal["motor"]
     rotor: int = Field(ge=0, le=15, description="index in the vehicle's file")
-    left: Share = 0.0
+    left: Share = Field(0.0, description="share of the thrust that is left")
 
 
 class ClockFault(_OfVehicle):
@@ -71,8 +71,12 @@ class ClockFault(_OfVehicle):
     """
 
     kind: Literal["clock"]
-    late_ms: float = Field(0.0, ge=-600_000.0, le=600_000.0)
-    drift_ppm: float = Field(0.0, ge=-10_000.0, le=10_000.0)
+    late_ms: float = Field(
+        0.0, ge=-600_000.0, le=600_000.0, description="ms by which it is late; negative: early"
+    )
+    drift_ppm: float = Field(
+        0.0, ge=-10_000.0, le=10_000.0, description="parts per million by which it is fast"
+    )
 
 
 class AutopilotClockFault(_OfVehicle):
@@ -82,8 +86,12 @@ class AutopilotClockFault(_OfVehicle):
     """
 
     kind: Literal["autopilot_clock"]
-    utc_error_ms: float = Field(0.0, ge=-600_000.0, le=600_000.0)
-    drift_ppm: float = Field(0.0, ge=-10_000.0, le=10_000.0)
+    utc_error_ms: float = Field(
+        0.0, ge=-600_000.0, le=600_000.0, description="ms by which its UTC is ahead when it is set"
+    )
+    drift_ppm: float = Field(
+        0.0, ge=-10_000.0, le=10_000.0, description="parts per million by which it is fast"
+    )
     utc: bool = Field(True, description="false: it never learns UTC, as without GNSS time")
 
 
@@ -91,14 +99,14 @@ class UtcStep(_Fault):
     """Step of the autopilot's UTC by ``step_ms``: from then on SYSTEM_TIME is that much ahead."""
 
     kind: Literal["utc_step"]
-    step_ms: float = Field(ge=-600_000.0, le=600_000.0)
+    step_ms: float = Field(ge=-600_000.0, le=600_000.0, description="ms; positive: ahead")
 
 
 class ClockStep(_Fault):
     """Step of the companion's system clock by ``step_ms``, while its kernel reports an unchanged error."""
 
     kind: Literal["clock_step"]
-    step_ms: float = Field(ge=-600_000.0, le=600_000.0)
+    step_ms: float = Field(ge=-600_000.0, le=600_000.0, description="ms; positive: ahead")
 
 
 Sudden = Freeze | Vanish | Restart | GpsLoss | GpsJump | MotorFailure | UtcStep | ClockStep
@@ -132,8 +140,8 @@ def description(fault: Sudden) -> str:
 class Clocks(Part):
     """Errors of the companions' clocks from the start: drawn per seed, uniform in ± these bounds."""
 
-    offset_ms: float = Field(1.0, ge=0.0, le=1_000.0)
-    drift_ppm: float = Field(20.0, ge=0.0, le=1_000.0)
+    offset_ms: float = Field(1.0, ge=0.0, le=1_000.0, description="ms, largest error at the start")
+    drift_ppm: float = Field(20.0, ge=0.0, le=1_000.0, description="parts per million, largest drift")
     system_us: int | None = Field(
         None,
         ge=0,

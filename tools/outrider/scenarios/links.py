@@ -24,14 +24,14 @@ class Direction(Part):
     system id of a companion or a moving obstacle, or null for all.
     """
 
-    sender: str | System | None = None
-    receiver: str | System | None = None
-    delay_ms: Milliseconds | None = None
-    jitter_ms: Milliseconds | None = None
-    loss: Share | None = None
-    duplication: Share | None = None
-    reordering: Share | None = None
-    burst: Burst | None = None
+    sender: str | System | None = Field(None, description="role or system id of who sends; null: all")
+    receiver: str | System | None = Field(None, description="role or system id of who receives; null: all")
+    delay_ms: Milliseconds | None = Field(None, description="ms")
+    jitter_ms: Milliseconds | None = Field(None, description="ms, largest additional delay")
+    loss: Share | None = Field(None, description="share of the messages that are lost")
+    duplication: Share | None = Field(None, description="share of the messages that arrive twice")
+    reordering: Share | None = Field(None, description="share of the messages that later ones overtake")
+    burst: Burst | None = Field(None, description="mean number of messages lost in a row; 0: each on its own")
 
 
 def _faults(said: dict[str, float]) -> Faults:
@@ -42,11 +42,11 @@ def _faults(said: dict[str, float]) -> Faults:
 class Links(Part):
     """Faults of one kind of link."""
 
-    delay_ms: Milliseconds = 20.0
-    jitter_ms: Milliseconds = 0.0
-    loss: Share = 0.0
-    duplication: Share = 0.0
-    reordering: Share = 0.0
+    delay_ms: Milliseconds = Field(20.0, description="ms")
+    jitter_ms: Milliseconds = Field(0.0, description="ms, largest additional delay")
+    loss: Share = Field(0.0, description="share of the messages that are lost")
+    duplication: Share = Field(0.0, description="share of the messages that arrive twice")
+    reordering: Share = Field(0.0, description="share of the messages that later ones overtake")
     burst: Burst = Field(0.0, description="mean number of messages lost in a row; 0: each on its own")
     directions: tuple[Direction, ...] = Field(
         (), max_length=64, description="exceptions by direction; for each value, the last match counts"
@@ -101,5 +101,5 @@ class PartitionPart(Part):
     """Partition of the swarm link: for a while nothing passes between ``members`` and all others."""
 
     at_s: Seconds = Field(description="after the goal event")
-    for_s: Duration
+    for_s: Duration = Field(description="s that it lasts")
     members: tuple[System, ...] = Field(min_length=1, description="system ids")

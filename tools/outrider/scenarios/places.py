@@ -25,8 +25,8 @@ class Ring(Part):
     """
 
     kind: Literal["ring"]
-    centre: tuple[Coordinate, Coordinate] = (0.0, 0.0)
-    radius: Length
+    centre: tuple[Coordinate, Coordinate] = Field((0.0, 0.0), description="m east and north")
+    radius: Length = Field(description="m")
     apart: Length | None = Field(
         None, description="m, of neighbours; the radius grows until there is room for all of them"
     )
@@ -75,7 +75,7 @@ class Bystander(Part):
 
     at: Position = Field(description="m, ENU; hovering there at first")
     goal: Position | None = Field(None, description="m, ENU; null: it stays")
-    after_s: Seconds = 0.0
+    after_s: Seconds = Field(0.0, description="s after the goal event at which it sets off")
     speed: float | None = Field(None, gt=0.0, le=20.0, description="m/s; null: as fast as the others may be")
     jitter: float = Field(0.0, ge=0.0, le=2.0, description="m, radius of the ball around its place")
 
@@ -89,18 +89,20 @@ class Bystander(Part):
 class Jump(Part):
     """Jump of the target to another place, ``after_s`` seconds after the goal event."""
 
-    after_s: Seconds
-    to: Position
+    after_s: Seconds = Field(description="s after the goal event")
+    to: Position = Field(description="m, ENU")
 
 
 class FixedTarget(Part):
     """A target that stays; it jumps at the goal event with ``jump_to``, and later with ``jumps``."""
 
     kind: Literal["fixed"]
-    at: Position
-    jump_to: Position | None = None
+    at: Position = Field(description="m, ENU")
+    jump_to: Position | None = Field(
+        None, description="m, ENU: where it is from the goal event on; null: it stays"
+    )
     jumps: tuple[Jump, ...] = Field((), description="in the order of time")
-    rate_hz: float = Field(5.0, gt=0.0, le=50.0)
+    rate_hz: float = Field(5.0, gt=0.0, le=50.0, description="Hz, of its position messages")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -113,7 +115,7 @@ class FixedTarget(Part):
 class Pace(Part):
     """Change of the target's speed, ``after_s`` seconds after the goal event."""
 
-    after_s: Seconds
+    after_s: Seconds = Field(description="s after the goal event")
     speed: float = Field(ge=0.0, le=20.0, description="m/s")
 
 
@@ -128,7 +130,7 @@ class PathTarget(Part):
     speed: float = Field(ge=0.0, le=20.0, description="m/s")
     paces: tuple[Pace, ...] = Field((), max_length=100, description="in the order of time")
     setting_out: float = Field(1.0, gt=0.0, le=10.0, description="m/s², until it has its speed")
-    rate_hz: float = Field(5.0, gt=0.0, le=50.0)
+    rate_hz: float = Field(5.0, gt=0.0, le=50.0, description="Hz, of its position messages")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -143,9 +145,9 @@ class RecordedTarget(Part):
 
     kind: Literal["recorded"]
     log: str = Field(description="tlog, relative to config/logs")
-    system: System
+    system: System = Field(description="system id of the recorded vehicle")
     start_s: Seconds = Field(description="after the log's first record")
-    duration_s: Duration
+    duration_s: Duration = Field(description="s of the log that are flown")
 
 
 Starts = Annotated[Ring | Points, Field(discriminator="kind")]

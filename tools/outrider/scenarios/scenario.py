@@ -50,7 +50,9 @@ _MAX_VEHICLES = 244
 class Timing(Part):
     """Periods, µs; all are whole multiples of the base tick."""
 
-    base_tick_us: Period = 2_500
+    base_tick_us: Period = Field(
+        2_500, description="µs: all periods are multiples of it; it divides a second"
+    )
     autopilot_us: Period = Field(
         10_000, description="how often an autopilot's node runs; its physics has its own"
     )
@@ -75,9 +77,11 @@ class AutopilotPart(Part):
 class Scenario(Part):
     """One flight."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
-    description: str = ""
-    task: Literal["escort", "antipodal", "goto"]
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$", description="names the run directory")
+    description: str = Field("", description="one line for lists and reports")
+    task: Literal["escort", "antipodal", "goto"] = Field(
+        description="escort: around the target; antipodal: to the opposite place; goto: to starts.goals"
+    )
     vehicles: int = Field(ge=1, le=244, description="number with the task, without bystanders")
     vehicle: str = Field("firefly", description="file in config/vehicles")
     flavour: FlavourName | tuple[FlavourName, ...] = Field(
@@ -85,7 +89,7 @@ class Scenario(Part):
     )
     autopilot: AutopilotPart = AutopilotPart()
     origin: Origin = Origin()
-    starts: Starts
+    starts: Starts = Field(description="where the vehicles hover first: on a ring, or at given points")
     bystanders: tuple[Bystander, ...] = Field((), max_length=50)
     physics: Literal["own", "jsbsim"] = Field(
         "own", description="what moves the vehicles: our own integrator, or JSBSim (extra sitl)"
@@ -96,12 +100,15 @@ class Scenario(Part):
     ending: Literal["land", "return"] = Field(
         "land", description="what the operator orders in the end: land here, or return to the start and land"
     )
-    target: Target
+    target: Target = Field(description="what is escorted or faced: fixed, on a path, or recorded")
     obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed, known to all companions")
     moving: tuple[MovingPart, ...] = Field(
         (), max_length=50, description="obstacles that move; their system ids are 190 and so on"
     )
-    sensors: Literal["truth", "rtk", "gnss", "sih"] = "truth"
+    sensors: Literal["truth", "rtk", "gnss", "sih"] = Field(
+        "truth",
+        description="error of positions: truth, rtk (2 cm), gnss (0.4 m), sih: as PX4's own simulation",
+    )
     camera: CameraConfig | None = Field(
         None, description="of every vehicle but the bystanders; null: that of the vehicle's file, if any"
     )
@@ -115,7 +122,7 @@ class Scenario(Part):
     cap_s: float = Field(60.0, gt=0.0, le=3600.0, description="simulated seconds after the goal event")
     links: AllLinks = AllLinks()
     partitions: tuple[PartitionPart, ...] = ()
-    faults: tuple[FaultPart, ...] = ()
+    faults: tuple[FaultPart, ...] = Field((), description="what goes wrong with single vehicles, and when")
     clocks: Clocks = Clocks()
     timing: Timing = Timing()
     companion: CompanionConfig = CompanionConfig()
