@@ -15,6 +15,7 @@ from companion.config.planning import LimitsConfig, MethodName
 from companion.flight.state_machine import Pilot
 from companion.goals.goals import Goals
 from companion.values.horizon import Array, Motion
+from companion.values.mates import Mates, Sight
 from companion.values.obstacles import Obstacles
 from companion.world import View
 from outrider.planner.arrays import checked
@@ -60,17 +61,19 @@ class OwnGoals(Goals):
         system: int,
         pilot: Pilot,
         lookahead_s: float,
+        target_system: int,
         surface: OwnSurface | None,
     ) -> None:
-        super().__init__(config.model_copy(update={"task": "escort"}), system, pilot, lookahead_s)
+        escorting = config.model_copy(update={"task": "escort"})
+        super().__init__(escorting, system, pilot, lookahead_s, target_system)
         if surface is not None:
             self._surface = _CheckedSurface(surface)
 
     def _destination(
-        self, now: int, view: View, measured: Motion, obstacles: Obstacles, neighbours: Array
+        self, now: int, view: View, measured: Motion, obstacles: Obstacles, mates: Mates, sight: Sight
     ) -> Aim:
         if self.goal is None:
-            return super()._destination(now, view, measured, obstacles, neighbours)
+            return super()._destination(now, view, measured, obstacles, mates, sight)
         # Without goal and target the vehicle holds the position where both ended.
         self._held = None
         return standing(self.goal, None if view.target is None else view.target.position)

@@ -27,7 +27,7 @@ from outrider.errors import InputError
 from outrider.planner.arrays import checked, number, system_id
 from outrider.planner.guided_pilot import GuidedPilot
 from outrider.planner.own_parts import OwnGoals, OwnMethods, OwnSurface
-from outrider.planner.surroundings import Surroundings
+from outrider.planner.surroundings import TARGET_ID, Surroundings
 from outrider.planner.values import Neighbour, Obstacle, Plan, Setpoint, Step, Target, microseconds
 
 Neighbours = Sequence[Neighbour] | Array
@@ -96,7 +96,7 @@ class Planner:
             parts = VehicleParts(config, own, self._fleet, world, self._pilot, self._times)
             self._avoidance = CertifiedAvoidance(parts)
         ahead = self._avoidance.lookahead_s
-        self._goals = OwnGoals(config, self.id, self._pilot, ahead, self._surface)
+        self._goals = OwnGoals(config, self.id, self._pilot, ahead, TARGET_ID, self._surface)
         self._planning = Planning(config, world, self._pilot, self._goals, self._avoidance)
 
     def step(

@@ -10,11 +10,14 @@ from companion.config import CompanionConfig
 from companion.estimation.tracks import State
 from companion.obstacles.static import Axes, FixedObstacles
 from companion.values.horizon import Array
+from companion.values.mates import Mates
 from companion.values.obstacles import Obstacles
 from companion.world import View, reach
 from mavlink_bridge.frames import LocalFrame
 from outrider.planner.values import Neighbour, Obstacle, Target, microseconds
 
+TARGET_ID = 0
+"""Id of the target among the obstacles."""
 _FIRST_OBSTACLE_ID = 5000
 """Ids of the caller's obstacles begin here: above those of configured ones."""
 _MAX_PLAN_DEVIATION_M = 1.0
@@ -72,7 +75,9 @@ class Surroundings:
             ahead: Array = 1e-6 * self._dt * np.arange(float(self._steps))
             places = target.ahead(ahead).positions[None]
             found = found.joined(
-                Obstacles((0,), places, config.target_d_min + margin, config.target_d_safe + margin, margin)
+                Obstacles(
+                    (TARGET_ID,), places, config.target_d_min + margin, config.target_d_safe + margin, margin
+                )
             )
         if len(self._fixed):
             found = found.joined(self._enlarged(self._fixed.around(prediction, self._reach)))
@@ -98,9 +103,11 @@ class Surroundings:
             for one in self._neighbours
         ]
 
-    def mates(self, now: int) -> Array:
-        """Return the positions (M, 3), m, of the neighbours that share a plan which is not too old."""
-        return np.array([self._here(one, now) for one in self._planning(now)]).reshape(-1, 3)
+    def mates(self, now: int) -> Mates:
+        """Return the neighbours that share a plan which is not too old."""
+        found = self._planning(now)
+        places = np.array([self._here(one, now) for one in found]).reshape(-1, 3)
+        return Mates(tuple(one.id for one in found), places)
 
     def mate_ids(self, now: int) -> frozenset[int]:
         """Return the ids of the neighbours that share a plan which is not too old."""
