@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from companion.backup_node import LINKS, BackupNode, accepts
+from companion.backup.links import LINKS, accepts
+from companion.backup_node import BackupNode
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.messages import GpsGlobalOrigin, Message, Tunnel
 from mavlink_bridge.node import Datagram

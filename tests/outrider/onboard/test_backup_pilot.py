@@ -10,7 +10,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.committed import carried_on, horizon_of, rest_time
 from companion.avoidance.certified.fingerprint import fingerprint
-from companion.backup_node import BACKUP, BackupNode
+from companion.backup.links import BACKUP
+from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
 from companion.values.components import COMPONENT
 from mavlink_bridge.key import Key

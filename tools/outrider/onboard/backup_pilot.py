@@ -7,7 +7,7 @@ from typing import Final, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.backup_node import LINKS, accepts, accepts_peers
+from companion.backup.links import LINKS, accepts, accepts_peers
 from companion.flight.hold_on_exit import HoldOnExit
 from companion.telemetry.reception import LINKS as COMPANION_LINKS
 from mavlink_bridge.key import Key

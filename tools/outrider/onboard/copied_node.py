@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from companion.backup_node import LINKS
+from companion.backup.links import LINKS
 from companion.node import Companion
 from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, Message, Source
 from mavlink_bridge.node import Datagram, Node

@@ -8,7 +8,6 @@ alone, in its turn (``turns``). No socket and no clock.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -31,10 +30,10 @@ from outrider.preflight.findings import Check, Result, Verdict
 from outrider.preflight.judgement import judge
 from outrider.preflight.link_meter import LinkMeter
 from outrider.preflight.lone_flight import LoneFlight
-from outrider.preflight.own_checks import CLOCK, SIGMA, TUBE, own_checks
+from outrider.preflight.own_checks import own_checks
+from outrider.preflight.own_report import flight_check, own_report
 from outrider.preflight.terms import Phase, Terms
 from outrider.preflight.turns import PERIOD_US, Turns
-from outrider.scenarios.fleet_file import stated_at
 
 _REPORT_US: Final = 200_000
 """Time between two transmissions of the own report, µs."""
@@ -272,41 +271,15 @@ class Preflight:
 
     def _report(self, now: int) -> None:
         """Check the own vehicle, and make the report that is sent from now on."""
-        terms, autopilot, clock, flown = self._terms, self.autopilot, self.clock.bound, self._terms.flown
-        drift = None
-        if self.turns is not None:
-            flown, drift = self.turns.result, self.turns.drift
-        checks = own_checks(terms.system, terms.config, autopilot, clock, flown, drift, doubled=self._doubled)
-        self._checks = (*checks, *self._of_flight())
+        terms, turns, clock = self._terms, self.turns, self.clock.bound
+        flown, drift = (terms.flown, None) if turns is None else (turns.result, turns.drift)
+        own = terms.system, terms.config, self.autopilot
+        checks = own_checks(*own, clock, flown, drift, doubled=self._doubled)
+        self._checks = (*checks, *flight_check(terms, turns))
         links = [meter.figure(now).report(system) for system, meter in self.meters.items()]
-        figures = (
-            None if autopilot.sigma is None else _millimetres(autopilot.sigma),
-            None if clock is None else min(clock, 0xFFFFFFFF),
-            None if flown is None else _millimetres(flown.largest),
-        )
-        of_sigma, of_clock, of_tube = (bool(stated_at(terms.config, path)) for path in (SIGMA, CLOCK, TUBE))
-        number = 0 if autopilot.profile is None else autopilot.profile.autopilot
-        report = Report(
-            terms.run,
-            self._fingerprint,
-            self._passed,
-            (of_sigma, of_clock, of_tube),
-            0,
-            1,
-            number,
-            now // 1_000_000,
-            figures,
-            (),
-        )
+        figures = self.autopilot.sigma, clock, flown
+        report = own_report(now, terms, self._fingerprint, self.autopilot, figures, passed=self._passed)
         self._parts = in_parts(report, links)
-
-    def _of_flight(self) -> list[Check]:
-        """Return the check of the flight alone once it is over."""
-        turns = self.turns
-        if turns is None or not turns.trouble or self._terms.fly is None:
-            return []
-        result = Result.NOTE if self._terms.fly.dry else Result.FAIL
-        return [Check(f"vehicle {self._terms.system}", "flight", result, turns.trouble)]
 
     def _due(self, now: int) -> list[Message]:
         """Return the probe and the own report, as far as they are due."""
@@ -359,8 +332,3 @@ class Preflight:
         if self._parts:
             reports[terms.system] = whole(self._parts)
         return judge(self._checks, reports, missing, terms.config, terms.origin, terms.seconds)
-
-
-def _millimetres(length: float) -> int:
-    """Return ``length`` (m) in mm, rounded up, at most what two bytes hold."""
-    return min(ceil(1e3 * length), 65_535)

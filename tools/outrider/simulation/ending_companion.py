@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from companion.backup_node import BackupNode, accepts_peers
+from companion.backup.links import accepts_peers
+from companion.backup_node import BackupNode
 from companion.fleet_time_backup import FleetTimeBackup
 from companion.node import Companion
 from companion.planning.avoidance import Tally
