@@ -23,8 +23,8 @@ from sitl.camera.scene import LINK, Scene
 CHANNEL = "sight"
 DELAY_US = 20_000
 """µs: no less than the time between two exchanges of a flight's processes, and less than cameras take."""
-_GROUND_M = 0.05
-"""m below the ground: the foot of an object that stands on the ground is not hidden by it."""
+_GROUND_M = 0.1
+"""m below the origin: the ground is as far below it as a vehicle's centre is above the ground."""
 _HERE = (0.0, 0.0, 0.0)
 
 
