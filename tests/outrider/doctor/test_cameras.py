@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from mavlink_bridge.messages import (
+    CameraFovStatus,
     CameraTrackingGeo,
     CameraTrackingImage,
     CommandLong,
@@ -26,6 +27,7 @@ from sitl.values.camera import CameraConfig
 from tests.outrider.doctor.bench import Bench, autopilot, found
 from tests.sitl.autopilot_rig import FIREFLY, SITE
 
+OTHER = Source(11, 101)
 OK, NOTE, WARNING = Severity.OK, Severity.NOTE, Severity.WARNING
 
 
@@ -108,9 +110,9 @@ def frames(*messages: Message) -> Any:
 @pytest.mark.parametrize(
     ("said", "words", "severity"),
     [
-        (CameraTrackingGeo(Source(11, 101), 1, 47.0, 8.0, 400.0, None, 0.0, 0.0), "without h_acc", WARNING),
+        (CameraTrackingGeo(OTHER, 1, 47.0, 8.0, 400.0, None, 0.0, 0.0), "without h_acc", WARNING),
         (
-            CameraTrackingImage(Source(11, 101), 1, 1, 4, (0.5, 0.5), None, None),
+            CameraTrackingImage(OTHER, 1, 1, 4, (0.5, 0.5), None, None),
             "without a rectangle",
             WARNING,
         ),
@@ -121,3 +123,13 @@ def test_another_camera_is_judged_by_what_it_says(said: Message, words: str, sev
     finding = next(one for one in verdict.findings if "camera 11/101 speaks" in one.what)
     assert words in finding.what
     assert finding.severity is severity
+
+
+@pytest.mark.parametrize("stamp", [0, 10**9])
+def test_another_clock_than_the_autopilots_is_a_warning(stamp: int) -> None:
+    geo = CameraTrackingGeo(OTHER, 1, 47.0, 8.0, 400.0, None, 0.5, 0.5, None, 8.0, 0.0, 0.01)
+    view = CameraFovStatus(OTHER, stamp, None, None, (1.0, 0.0, 0.0, 0.0), 1.2, 0.7)
+    rig = bench()
+    rig.run(5.0)
+    finding = found(rig.consult(beside=frames(geo, view)), "camera 11/101 has another clock")
+    assert finding.severity is WARNING
