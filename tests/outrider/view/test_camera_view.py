@@ -66,6 +66,9 @@ def test_an_image_without_a_detection_ends_the_last_one() -> None:
     np.testing.assert_allclose(camera.row[[0, 1, 2, 9, 10, 11]], (1, 2, 3, 1, 9, 0), atol=1e-3)
     assert camera.receive(view, SITE)
     assert np.isnan(camera.row[9:]).all()
+    assert camera.receive(view._replace(attitude=(0.0,) * 4, horizontal_field=0.0), SITE)
+    assert np.isfinite(camera.row[:3]).all()
+    assert np.isnan(camera.row[3:]).all()
     assert not camera.receive(Heartbeat(ME, 30, 8, 0, 0, 4), SITE)
     assert len(NO_VIEW) == COLUMNS
     assert np.isnan(NO_VIEW).all()

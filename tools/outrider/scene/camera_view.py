@@ -87,9 +87,15 @@ class CameraReceiver:
     def receive(self, message: Message, frame: FleetFrame) -> bool:
         """Receive ``message``; return whether it changed the row. ``frame``: the fleet's."""
         if isinstance(message, CameraFovStatus):
-            fields = (message.horizontal_field, message.vertical_field)
+            across, down = message.horizontal_field, message.vertical_field
+            # Who forwards a detection tells the place of the camera alone.
+            looks = across > 0.0 and down > 0.0 and any(message.attitude)
             place = None if message.place is None else frame.to_enu(*message.place)
-            self.row = view_row(place, message.attitude, fields, None)
+            self.row = (
+                view_row(place, message.attitude, (across, down), None)
+                if looks
+                else view_row(place, None, None, None)
+            )
         elif isinstance(message, CameraTrackingGeo):
             self.row = self.row.copy()
             self.row[9:] = frame.to_enu(message.latitude, message.longitude, message.altitude)

@@ -109,7 +109,8 @@ def record(
             if one.link in (_SWARM, _AUTOPILOT):
                 for message in codec.feed(one.frame, whole=True):
                     _take(found, owner, one.time, one.link, message)
-                    _look(found, camera, owner, one.time, message, frame)
+                    if one.link == _AUTOPILOT:
+                        _look(found, camera, owner, one.time, message, frame)
     except LogError:
         return found
     order = np.argsort(found.epochs, kind="stable").tolist()
