@@ -81,8 +81,8 @@ class Ground(NamedTuple):
     down: float
 
     def hides(self, eye: Point, point: Point) -> bool:
-        """Return whether ``eye`` or ``point`` is below the ground."""
-        return max(eye[2], point[2]) > self.down
+        """Return whether ``point`` is below the ground; an eye never is."""
+        return point[2] > self.down
 
     def moved(self, by: Point) -> Ground:
         """Return the ground moved vertically."""

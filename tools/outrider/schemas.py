@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from outrider.scenarios.cameras import CameraFile
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.scenarios.scenario import Scenario
 from outrider.sweep.grid import Sweep
@@ -23,6 +24,7 @@ SCHEMAS: list[tuple[str, type[BaseModel]]] = [
     ("scenario", Scenario),
     ("companion", FlyConfig),
     ("vehicle", VehicleConfig),
+    ("camera", CameraFile),
     ("sweep", Sweep),
     ("scene", Scene),
 ]

@@ -153,7 +153,7 @@ def test_the_own_echo_is_a_stranger_and_a_companion_is_none() -> None:
 
 
 def test_two_runs_have_groups_of_their_own_even_on_the_same_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    ports = wirings._free_ports(2)
+    ports = wirings._free_ports(3)
     monkeypatch.setattr(wirings, "_free_ports", lambda _count: ports)
     clock = WallClock()
     runs = [wirings.wire(2, clock) for _ in range(2)]

@@ -28,7 +28,7 @@ CAMERA: dict[str, Any] = {
 SIGHT: dict[str, Any] = {
     "vehicles": 3,
     "airborne": True,
-    "cap_s": 2.0,
+    "cap_s": 1.5,
     "starts": {"kind": "ring", "radius": 6.0, "height": 5.0},
     "obstacles": [{"kind": "post", "at": [-3.0, 0.0], "radius": 0.4}],
     "moving": [
@@ -67,8 +67,7 @@ def detections(path: Path) -> list[tuple[int, CameraTrackingGeo]]:
 def test_the_bytes_do_not_depend_on_processes_or_on_the_order_of_nodes(tmp_path: Path) -> None:
     of = scenario("walk", **SIGHT, sensors="rtk")
     _, logs = flown(of, tmp_path / "1")
-    assert flown(of, tmp_path / "2", processes=2)[1] == logs
-    assert flown(of, tmp_path / "back", reverse_nodes=True)[1] == logs
+    assert flown(of, tmp_path / "2", processes=2, reverse_nodes=True)[1] == logs
     assert len(detections(tmp_path / "1" / "vehicle-12.tlog")) > 20
 
 
@@ -81,6 +80,9 @@ def test_cameras_see_where_the_target_was_when_the_image_was_taken(tmp_path: Pat
             assert place is not None
             flight.change(now, Change(target=(place[0] + 0.6, place[1], place[2])))
             moved.append(now)
+            # A picture shows the last developed image, 150 to 200 ms old; one in ten has no detection.
+            seen = np.array([one.view[9:] for one in flight.snapshots(now)])
+            assert np.nanmax(np.linalg.norm(seen - place, axis=1)) < 0.6
 
     flight, _ = flown(scenario("walk", **EXACT), tmp_path / "run", onlooker=move)
     target = flight.fleet.target()

@@ -224,3 +224,16 @@ def test_steps_fit_the_clocks_grid_and_the_physics(speed: float) -> None:
     # A millisecond of the wall, as long as telemetry at 20 Hz keeps its rate.
     assert period(speed) / speed >= 750.0 or period(speed) == 50_000
     assert period(1.0) == PERIOD
+
+
+def test_a_camera_is_a_shipped_name_or_a_file() -> None:
+    assert asked().camera is None
+    assert asked(camera="walker").target() is not None
+    with pytest.raises(InputError, match="neither a file nor a shipped name; cameras are walker"):
+        asked(camera="walkr")
+
+
+def test_the_tracked_object_has_an_id_that_no_vehicle_has() -> None:
+    for count, first in ((1, 1), (254, 1), (1, 254)):
+        request = asked(count=count, first_id=first, camera="walker")
+        assert request.target_system not in request.systems

@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +19,24 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from mavlink_bridge.key import create_key
-from mavlink_bridge.messages import CommandLong, Heartbeat, Message, ParamSet, Source, StatusText, Timesync
+from mavlink_bridge.messages import (
+    CameraFovStatus,
+    CameraTrackingGeo,
+    CommandLong,
+    Heartbeat,
+    HilState,
+    Message,
+    ParamSet,
+    Source,
+    StatusText,
+    Timesync,
+)
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import Framer
 from mavlink_bridge.wire.signing import EPOCH, Signing
 from outrider.errors import InputError, OutriderError
+from outrider.simulation.targets import Walking
 from outrider.sitl_server.addresses import addresses
 from outrider.sitl_server.display import watching
 from outrider.sitl_server.event_feed import EventFeed
@@ -34,6 +47,7 @@ from outrider.sitl_server.screen import Screen
 from outrider.sitl_server.shared_page import MAX_TEXTS, Pace, SharedPage, VehicleSnapshot
 from outrider.sitl_server.traffic import Traffic
 from outrider.sitl_server.vehicle_group import SPREAD, VehicleGroup, boot_times
+from sitl.values.camera import TrackedObject
 
 GCS = Source(255, 190)
 PERIOD = 20_000
@@ -50,7 +64,7 @@ class Field:
             for index in indices
         }
         self.board = SharedPage(asked.count, 1)
-        self.group = VehicleGroup(vehicles, boots, asked.first_id, self.board, asked.speed)
+        self.group = VehicleGroup(vehicles, boots, asked.first_id, self.board, asked.speed, asked.target())
         self.now = 0
         self._codec = Codec()
 
@@ -353,3 +367,35 @@ def test_a_picture_fits_the_terminal(width: int, height: int, count: int) -> Non
     assert any("1.00 × real time" in line for line in lines)
     if len(rows) < count:
         assert any(f"and {count - len(rows)} more" in line for line in lines)
+
+
+def test_cameras_see_the_walker_where_it_is_and_clients_get_no_ground_truth() -> None:
+    asked = checked(Options(count=2, first_id=1, camera="walker"))
+    assert asked.camera is not None
+    exact = asked.camera.camera.model_copy(
+        update={"pixel_sigma": 0.0, "false_positives": 0.0, "object": TrackedObject(height_sigma=0.0)}
+    )
+    asked = replace(asked, camera=asked.camera.model_copy(update={"camera": exact}))
+    field = Field(asked, [0, 1])
+    target = Walking(asked.camera.target, asked.frame)  # type: ignore[arg-type]
+    target.begin(0)
+    heard = field.run(5.0)
+    assert set(heard) == {"0", "1"}
+    for link, messages in heard.items():
+        boot = field.group.slots[int(link)].boot
+        time, found = 0, 0
+        for message in messages:
+            assert not isinstance(message, HilState)
+            if isinstance(message, CameraFovStatus):
+                time = message.time_boot + boot
+            elif isinstance(message, CameraTrackingGeo):
+                place = asked.frame.to_enu(message.latitude, message.longitude, message.altitude)
+                assert np.linalg.norm(place - target.position(time)) < 0.05
+                found += 1
+        assert found > 20
+
+
+def test_a_vehicle_without_a_camera_has_none() -> None:
+    field = Field(checked(Options()), [0])
+    (messages,) = field.run(2.0).values()
+    assert {message.source.component for message in messages} == {1}

@@ -84,7 +84,7 @@ def test_pause_step_speed_and_a_time_that_is_chosen(made: WrittenRun) -> None:
 def test_who_is_disarmed_flies_no_plan() -> None:
     plan = np.ones((KNOTS, 6), dtype=np.float32)
     flying, landed = (Heartbeat(Source(1, 1), 2, 12, mode, 6 << 16, 4) for mode in (0x80, 0))
-    flown = Record([0, 500_000], [plan, plan], [], [], [0, 1_000_000], [flying, landed], {})
+    flown = Record([0, 500_000], [plan, plan], [], [], [0, 1_000_000], [flying, landed], {}, [], [])
     assert flown.mode(-1) == ""
     assert flown.mode(999_999) == "OFFBOARD"
     assert np.isfinite(flown.plan(999_999)).all()

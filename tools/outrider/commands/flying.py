@@ -154,6 +154,9 @@ def sitl(
         typer.Option(help="Directory where parameters and missions are kept."),
     ] = None,
     signing_key: SigningKey = None,
+    camera: Annotated[
+        str | None, typer.Option(help="Cameras of the vehicles and what they see: a file, or walker.")
+    ] = None,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so many s.")] = None,
     as_json: Annotated[
         bool,
@@ -180,6 +183,7 @@ def sitl(
         speedup=speedup,
         seed=seed,
         signing_key=signing_key,
+        camera=camera,
     )
     raise typer.Exit(run(checked(options), Terms(port_base, tuple(to or ()), host, state, seconds, as_json)))
 

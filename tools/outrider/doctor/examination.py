@@ -7,7 +7,18 @@ from itertools import chain
 from typing import Final
 
 from mavlink_bridge.messages import Source
-from outrider.doctor import agility, clocks, health, identity, place, positioning, presence, settings, wire
+from outrider.doctor import (
+    agility,
+    cameras,
+    clocks,
+    health,
+    identity,
+    place,
+    positioning,
+    presence,
+    settings,
+    wire,
+)
 from outrider.doctor.case import Case
 from outrider.doctor.finding import Finding, Severity, Verdict
 from outrider.doctor.hearing import Hearing
@@ -28,6 +39,7 @@ _CHECKS: Final[tuple[Callable[[Case], Iterator[Finding]], ...]] = (
     clocks.clock,
     settings.settings,
     agility.agility,
+    cameras.cameras,
     presence.company,
     wire.wire,
 )

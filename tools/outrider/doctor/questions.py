@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.telemetry.sharing import onboard_heartbeat
 from mavlink_bridge.messages import CommandLong, Message, ParamRequestRead, Source
+from outrider.doctor.cameras import cameras_of
 from outrider.doctor.examination import Examination
 from outrider.doctor.objections import Objections
 from outrider.doctor.sender_record import SenderRecord
@@ -53,6 +54,7 @@ _STREAMED: Final = (
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
 )
+_CAMERA: Final[int] = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
 _ESTIMATOR: Final = {
     True: mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
     False: mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
@@ -71,6 +73,7 @@ class Questions:
     def __init__(self, examination: Examination) -> None:
         self._examination = examination
         self._asked: dict[int | str, _Asked] = {}
+        self._asked_cameras: dict[Source, _Asked] = {}
         self._objections = Objections()
         self._met_at: int | None = None
         self._addressee: Source | None = None
@@ -93,6 +96,7 @@ class Questions:
             self._beat = now
             said.append(onboard_heartbeat(self.me))
         if vehicle is not None:
+            said += self._ask_cameras(vehicle, now)
             open_ones = [key for key in self._wanted(vehicle, now) if self._is_open(key, vehicle, now)]
             said += [self._ask(key, vehicle, now) for key in open_ones[:_MAX_REQUESTS_PER_STEP]]
             said += self._objections.due(vehicle, self.me, now)
@@ -117,6 +121,19 @@ class Questions:
         """Return the longest time (µs) left to wait for the reasons of a failed pre-arm check."""
         vehicle = self._examination.vehicle
         return 0 if vehicle is None else self._objections.left(vehicle, now)
+
+    def _ask_cameras(self, vehicle: SenderRecord, now: int) -> list[Message]:
+        """Return requests for CAMERA_INFORMATION to the vehicle's cameras that have not sent it."""
+        said: list[Message] = []
+        for camera in cameras_of(self._examination.hearing, vehicle.source.system):
+            times, last = self._asked_cameras.get(camera.source, _Asked(0, 0))
+            waits = times and now - last < _REPEAT_INTERVAL_US
+            if _CAMERA in camera.streams or times >= _MAX_REQUESTS or waits:
+                continue
+            self._asked_cameras[camera.source] = _Asked(times + 1, now)
+            params = (float(_CAMERA), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            said.append(CommandLong(self.me, *camera.source, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, params))
+        return said
 
     def _wanted(self, vehicle: SenderRecord, now: int) -> tuple[int | str, ...]:
         px4 = vehicle.is_px4

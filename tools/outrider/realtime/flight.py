@@ -92,7 +92,13 @@ class RealTimeFlight:
             first.step(now, [])
         window = None if self._view is None else Window(self.scenario.size)
         board = SharedPage(self.scenario.size, window)
-        wiring = wire(self.scenario.size, self._clock, len(self.scenario.moving), len(self.fleet.with_backup))
+        wiring = wire(
+            self.scenario.size,
+            self._clock,
+            len(self.scenario.moving),
+            len(self.fleet.with_backup),
+            cameras=self.fleet.has_cameras,
+        )
         with TemporaryDirectory() as folder, self._interruptible():
             scratch = Path(folder)
             start = self._clock.now() + (_START_WITH_PRIORITY if self._priority else _START)

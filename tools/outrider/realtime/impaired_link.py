@@ -13,19 +13,28 @@ from mavlink_bridge.network.simulated import Channel, SimulatedNetwork
 from mavlink_bridge.node import Datagram, Node
 from mavlink_bridge.wire.header import sending_system
 from outrider.runs import names
+from sitl.camera.scene import LINK as SIGHT
 
 
 class ImpairedLink:
     """``node`` behind ``network``, of which each channel leads from one sender to ``node``.
 
     ``senders``: for each link the node at its other end, or None if there are several; the system id in the
-    header then identifies the sender. Data from other senders, possible on a multicast group, is dropped.
+    header then identifies the sender; ``target`` is that of the target. Data from other
+    senders, possible on a multicast group, is dropped.
     """
 
     def __init__(
-        self, node: Node, senders: Mapping[str, str | None], channels: Sequence[Channel], seed: int, tick: int
+        self,
+        node: Node,
+        senders: Mapping[str, str | None],
+        channels: Sequence[Channel],
+        seed: int,
+        tick: int,
+        target: int,
     ) -> None:
         self.node = node
+        self._target = target
         self._senders = senders
         self._channels = [channel.name for channel in channels]
         self._known = {end for channel in channels for end in channel.members.items() if end[0] != node.name}
@@ -65,7 +74,11 @@ class ImpairedLink:
         """Return the name of the node with the system id in the header."""
         system = sending_system(datagram.data)
         moving = names.moving(system)
-        return moving if (moving, datagram.link) in self._known else names.companion(system)
+        if (moving, datagram.link) in self._known:
+            return moving
+        if datagram.link != SIGHT:
+            return names.companion(system)
+        return names.TARGET if system == self._target else names.autopilot(system)
 
     def cut(self, members: Iterable[str]) -> None:
         """Block the swarm's channels between ``members`` and others."""

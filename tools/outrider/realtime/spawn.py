@@ -42,7 +42,7 @@ def spawn(
         companion = EndingCompanion(partial(fleet.companion, k, time.thread_time_ns, start))
         own = [event for event in happening if getattr(event.what, "vehicle", None) == system]
         computers = [event for event in own if isinstance(event.what, ClockStep | Restart)]
-        behind = rough(fleet, autopilot, {"autopilot": companion.name})
+        behind = rough(fleet, autopilot, {"autopilot": companion.name, "sight": None})
         first, phase, its_clock = turns(fleet, k, start)
         every = Scheduled(behind, timing.autopilot_us, first)
         trace = scratch / f"trace-{system}"
@@ -78,9 +78,11 @@ def spawn(
         every = Scheduled(behind, timing.companion_us, turn, fleet.clock(k, start))
         workers.append(Worker(NodeEnvironment(behind, every, wiring.backup_nodes[index], clock, board)))
     phase = start + staggered(_slots(fleet) - 2, _slots(fleet), timing.companion_us)
-    played: list[Target | MovingObstacle] = [fleet.target(), *fleet.moving()]
-    for node, links in zip(played, [wiring.target, *wiring.moving], strict=True):
-        behind = rough(fleet, node, {})
+    target, obstacles = fleet.target(), fleet.moving()
+    played: list[Target | MovingObstacle] = [target, *obstacles]
+    shown = fleet.shown(target, obstacles)
+    for node, seen, links in zip(played, shown, [wiring.target, *wiring.moving], strict=True):
+        behind = rough(fleet, seen, {})
         every = Scheduled(behind, timing.companion_us, phase)
         workers.append(PlayedWorker(node, NodeEnvironment(behind, every, links, clock, board)))
     return workers
@@ -122,7 +124,12 @@ def staggered(k: int, count: int, period: int) -> int:
 def rough(fleet: Fleet, node: Node, senders: dict[str, str | None]) -> ImpairedLink:
     """Return ``node`` behind the links that the scenario defines; ``senders`` as for ``ImpairedLink``."""
     return ImpairedLink(
-        node, senders, _channels(fleet, node.name), fleet.seed, fleet.scenario.timing.base_tick_us
+        node,
+        senders,
+        _channels(fleet, node.name),
+        fleet.seed,
+        fleet.scenario.timing.base_tick_us,
+        fleet.target_system,
     )
 
 
@@ -136,5 +143,6 @@ def _channels(fleet: Fleet, receiver: str) -> list[Channel]:
         for sender, name in channel.members.items():
             if sender != receiver:
                 faults = channel.overrides.get((sender, receiver), channel.faults)
-                found.append(Channel(f"{channel.name}-{sender}", {sender: name, receiver: link}, faults))
+                ends = {sender: name, receiver: link}
+                found.append(Channel(f"{channel.name}-{sender}", ends, faults, counted=channel.counted))
     return found

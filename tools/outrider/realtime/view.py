@@ -49,6 +49,11 @@ class ViewedNode(Protocol):
         ...
 
     @property
+    def views(self) -> NDArray[np.float32]:
+        """Rows (K, 12) of cameras; NaN where there is none."""
+        ...
+
+    @property
     def states(self) -> tuple[State, ...]:
         """States in the order of the vehicles."""
         ...
@@ -77,6 +82,7 @@ class RealTimeView:
             target if seen.target is None else seen.target.astype(np.float32),
             np.array(seen.moving, dtype=np.float32).reshape(-1, 3),
             shown.states,
+            shown.views,
         )
         self._line.send(pickle.dumps(moment, pickle.HIGHEST_PROTOCOL))
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from companion.config.planning import MethodName
 from outrider.processes.shared_memory import SharedMemory
+from outrider.scene.camera_view import COLUMNS
 from outrider.scene.changes import Change
 from outrider.scene.companion_snapshot import MODES, CompanionSnapshot
 from outrider.scene.snapshot import KNOTS, Array, State
@@ -19,8 +20,9 @@ from outrider.scene.view_commands import ViewCommands
 EVERY = 50_000
 """µs between two snapshots of a node."""
 _PLAN_COLUMNS = 6 * KNOTS
-_ROW_COLUMNS = 8 + _PLAN_COLUMNS
-"""Columns: attitude (4), mode, age (s), CPU time of the plan (ms), held plans, plan (KNOTS x 6)."""
+_VIEW = slice(8, 8 + COLUMNS)
+_ROW_COLUMNS = _VIEW.stop + _PLAN_COLUMNS
+"""Columns: attitude (4), mode, age (s), CPU time of the plan (ms), held plans, camera, plan (KNOTS x 6)."""
 _COMMAND_COLUMNS = 7
 """Columns: number of commands; methods as bits; loss (0…1); number of moves of the target; last place (3)."""
 _METHODS = ViewCommands(methods="baseline+swivel+approach_angle+tangential").method_names
@@ -44,7 +46,11 @@ class Window:
         """Write the snapshot of companion ``k``."""
         state, row = seen.state, self._rows[k]
         row[4:8] = MODES.index(state.mode), state.age_s, state.plan_ms, state.held or 0
-        row[8:] = seen.plan.ravel()
+        row[_VIEW.stop :] = seen.plan.ravel()
+
+    def show_view(self, k: int, view: NDArray[np.float32]) -> None:
+        """Write the row of the camera of vehicle ``k``."""
+        self._rows[k, _VIEW] = view
 
     @property
     def attitudes(self) -> Array:
@@ -54,7 +60,12 @@ class Window:
     @property
     def plans(self) -> NDArray[np.float32]:
         """Plans (K, KNOTS, 6), a copy."""
-        return self._rows[:, 8:].astype(np.float32).reshape(-1, KNOTS, 6)
+        return self._rows[:, _VIEW.stop :].astype(np.float32).reshape(-1, KNOTS, 6)
+
+    @property
+    def views(self) -> NDArray[np.float32]:
+        """Rows (K, 12) of the cameras, a copy."""
+        return self._rows[:, _VIEW].astype(np.float32)
 
     @property
     def states(self) -> tuple[State, ...]:

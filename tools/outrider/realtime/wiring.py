@@ -1,7 +1,7 @@
 """Links of a real-time run, all on this machine's loopback.
 
-Autopilots, companions and operator use unicast UDP; the swarm and the target each use a port of one multicast
-group of this run.
+Autopilots, companions and operator use unicast UDP; the swarm, the target and the ground truth for cameras
+each use a port of one multicast group of this run.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import Link
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.links.udp import UdpListener
+from sitl.camera.scene import LINK as SIGHT
 
 _HOST = "127.0.0.1"
 
@@ -48,10 +49,13 @@ class Wiring(NamedTuple):
                         link.close()
 
 
-def wire(vehicles: int, clock: Clock, moving: int = 0, backup_nodes: int = 0) -> Wiring:
+def wire(
+    vehicles: int, clock: Clock, moving: int = 0, backup_nodes: int = 0, *, cameras: bool = False
+) -> Wiring:
     """Open the links of ``vehicles``, ``moving`` obstacles and ``backup_nodes`` (numbers) on free ports.
 
-    Raises LinkError if a link cannot be opened, after closing the others.
+    With ``cameras`` there is also the link of the ground truth that cameras see. Raises LinkError if a link
+    cannot be opened, after closing the others.
     """
     with ExitStack() as opened:
 
@@ -65,7 +69,7 @@ def wire(vehicles: int, clock: Clock, moving: int = 0, backup_nodes: int = 0) ->
         operator: list[Link] = []
         listening = [(opening(f"udpin:{_HOST}:0"), opening(f"udpin:{_HOST}:0")) for _ in range(vehicles)]
         group = _group(_port(listening[0][0]))
-        swarm, target = (f"mcast:{group}:{port},{_HOST}" for port in _free_ports(2))
+        swarm, target, sight = (f"mcast:{group}:{port},{_HOST}" for port in _free_ports(3))
         for vehicle, ground in listening:
             # As with real autopilots, the autopilot sends first.
             autopilots.append({"autopilot": [opening(f"udpout:{_HOST}:{_port(vehicle)}")]})
@@ -87,11 +91,15 @@ def wire(vehicles: int, clock: Clock, moving: int = 0, backup_nodes: int = 0) ->
                 node["autopilot"].append(opening(f"udpout:{_HOST}:{_port(end)}"))
             backups.append({"autopilot": ends, "swarm": [opening(swarm)]})
         obstacles = [{"swarm": [opening(swarm)]} for _ in range(moving)]
+        played = {"target": [opening(target)]}
+        if cameras:
+            for node in (*autopilots, *obstacles, played):
+                node[SIGHT] = [opening(sight)]
         wiring = Wiring(
             autopilots,
             companions,
             backups,
-            {"target": [opening(target)]},
+            played,
             obstacles,
             {"ground": operator},
         )

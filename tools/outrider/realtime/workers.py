@@ -38,6 +38,7 @@ from outrider.simulation.bystander import Bystander
 from outrider.simulation.disturbances import Event, strike_autopilot, strike_computer
 from outrider.simulation.ending_companion import EndingCompanion
 from outrider.simulation.moving import MovingObstacle
+from outrider.simulation.sight import view_of
 from outrider.simulation.system_clocks import step_clock
 from outrider.simulation.targets import Target
 from sitl.node import Autopilot
@@ -197,6 +198,7 @@ class AutopilotWorker(Worker):
             self.board.show_vehicle(self._k, sample[0:3], sample[3:6], self._node.armed)
             if self.board.window is not None:
                 self.board.window.show_attitude(self._k, self._node.state.attitude)
+                self.board.window.show_view(self._k, view_of(self._node))
 
     def leave(self, path: Path) -> None:
         """Write the trace and the results."""

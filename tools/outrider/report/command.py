@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from outrider.errors import InputError
-from outrider.report import clocks
+from outrider.report import cameras, clocks
 from outrider.report.charts import charts, histogram
 from outrider.report.distances import encounters
 from outrider.report.events import Event, events
@@ -91,7 +91,8 @@ def _replay(
 ) -> str:
     shown = chosen(motions)
     drawn = charts(run, motions, shown, lost, clocks.errors(run.logs, ahead))
-    return document(run, motions, shown, drawn, histogram(run.plan_times), happened)
+    views = cameras.views(run, motions.system, motions.time[shown], ahead)
+    return document(run, motions, shown, drawn, histogram(run.plan_times), happened, views)
 
 
 def _title(run: Run) -> str:

@@ -10,10 +10,18 @@ import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.frames import ned_to_enu
-from mavlink_bridge.messages import CommandAck, Heartbeat, LocalPosition, Message, StatusText
+from mavlink_bridge.messages import (
+    CameraFovStatus,
+    CameraTrackingGeo,
+    CommandAck,
+    Heartbeat,
+    LocalPosition,
+    Message,
+    StatusText,
+)
 from mavlink_bridge.tlog.log import Record, TlogReport, read_tlog
 from mavlink_bridge.wire.codec import Codec
-from outrider.report.run import EventMessage, Log, Sender, Stream, Times
+from outrider.report.run import CameraMessage, EventMessage, Log, Sender, Stream, Times
 from outrider.runs import names
 
 SWARM = names.LINK_NUMBERS["swarm"]
@@ -22,6 +30,8 @@ _DECODED = {
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
     mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+    mavlink.MAVLINK_MSG_ID_CAMERA_FOV_STATUS,
+    mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS,
 }
 _MAX_TIME_US = 1 << 62
 """Latest time (µs): a damaged time stamp may exceed a 64-bit integer."""
@@ -82,6 +92,7 @@ class _Pass:
         self._moments = array("q")
         self._speeds = array("d")
         self._utterances: list[EventMessage] = []
+        self._seen: list[CameraMessage] = []
 
     def see(self, record: Record) -> None:
         """Process the next record."""
@@ -113,6 +124,8 @@ class _Pass:
         elif isinstance(message, Heartbeat):
             if message.source.component == mavlink.MAV_COMP_ID_AUTOPILOT1:
                 self._utterances.append(EventMessage(time, message))
+        elif isinstance(message, CameraFovStatus | CameraTrackingGeo):
+            self._seen.append(CameraMessage(time, message))
         elif isinstance(message, CommandAck | StatusText):
             self._utterances.append(EventMessage(time, message))
 
@@ -123,5 +136,14 @@ class _Pass:
         moments = _whole(self._moments)
         said = tuple(self._utterances)
         return Log(
-            self._owner, self._begin, self._end, self._sent.stream(), received, moments, speeds, said, report
+            self._owner,
+            self._begin,
+            self._end,
+            self._sent.stream(),
+            received,
+            moments,
+            speeds,
+            said,
+            report,
+            tuple(self._seen),
         )

@@ -25,6 +25,7 @@ SCRIPTS = (
     "glyphs.js",
     "scene.js",
     "vehicles.js",
+    "sight.js",
     "view.js",
     "axes.js",
     "charts.js",

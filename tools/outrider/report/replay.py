@@ -20,6 +20,7 @@ from outrider.simulation.conductor import HOLD
 
 MILLIMETRE, TENTH = 1e-3, 1e-4
 """Quanta: of lengths and speeds, 1 mm and 1 mm/s; of angles and times, 0.1 mrad and 0.1 ms."""
+_CENTIMETRE, _MILLIRADIAN = 1e-2, 1e-3
 _AFTER = 5.0
 """Time (s) for which a run is shown after the end of ``HOLD``, which begins with convergence."""
 
@@ -44,8 +45,9 @@ def document(
     charts: Sequence[Chart],
     spent: Histogram | None,
     events: Sequence[Event],
+    views: Array | None = None,
 ) -> str:
-    """Return the JSON document for the samples ``shown`` (n,).
+    """Return the JSON document for the samples ``shown`` (n,); ``views`` (n, K, 12) are the cameras' rows.
 
     It may stand in a script element: it contains no ``<``.
     """
@@ -62,6 +64,7 @@ def document(
         "tilt": packed(motions.tilt[shown], TENTH),
         "target": packed(motions.target[shown], MILLIMETRE),
         "moving": packed(motions.moving[shown], MILLIMETRE),
+        "cameras": None if views is None else _cameras(views),
         "scene": scene(run, motions),
         "charts": [_chart(chart) for chart in charts],
         "spent": None if spent is None else spent._asdict(),
@@ -113,6 +116,27 @@ def unpack(packed: Packed) -> Array:
     values = integers * packed.quantum
     result: Array = np.where(integers == np.iinfo(integers.dtype).min, np.nan, values)
     return result
+
+
+def _cameras(views: Array) -> dict[str, Any]:
+    """Return direction of the optical axes and detections, and the angles of view (rad, one pair each).
+
+    An axis is three angles (rad): from east towards north, above the horizon, and the roll about it.
+    """
+    w, x, y, z = np.moveaxis(views[..., 3:7], -1, 0)
+    heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    with np.errstate(invalid="ignore"):
+        pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    each = []
+    for k in range(views.shape[1]):
+        known = [pair for pair in views[:, k, 7:9].tolist() if np.isfinite(pair).all()]
+        each.append(known[-1] if known else None)
+    return {
+        "axis": packed(np.stack([0.5 * np.pi - heading, pitch, roll], axis=-1), _MILLIRADIAN),
+        "seen": packed(views[..., 9:], _CENTIMETRE),
+        "fields": each,
+    }
 
 
 def _chart(chart: Chart) -> dict[str, Any]:

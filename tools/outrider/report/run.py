@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink_bridge.messages import CommandAck, Heartbeat, StatusText
+from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo, CommandAck, Heartbeat, StatusText
 from mavlink_bridge.tlog.log import TlogReport
 from outrider.scenarios.scenario import Scenario
 
@@ -91,12 +91,20 @@ class EventMessage(NamedTuple):
     said: Said
 
 
+class CameraMessage(NamedTuple):
+    """Message of the vehicle's camera, at ``time`` µs on the clock of the log."""
+
+    time: int
+    said: CameraFovStatus | CameraTrackingGeo
+
+
 class Log(NamedTuple):
     """Data of one vehicle's tlog.
 
     ``begin``, ``end``: first and last record, µs on the vehicle's own clock. ``sent``: messages that the
     vehicle sent on the swarm link; ``received``: messages that it received there, empty if they have already
     been compared. ``speeds`` (n, 3): velocity reported by the autopilot at ``moments`` (n,) µs, ENU, m/s.
+    ``seen``: what its camera said.
     """
 
     owner: int
@@ -108,6 +116,7 @@ class Log(NamedTuple):
     speeds: Array
     utterances: tuple[EventMessage, ...]
     report: TlogReport
+    seen: tuple[CameraMessage, ...] = ()
 
 
 class Run(NamedTuple):

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from outrider.scene.camera_view import NO_VIEWS
+
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 KNOTS = 17
@@ -33,7 +35,8 @@ class Snapshot(NamedTuple):
 
     Missing values are NaN. ``stage``: stage of the flight; ``position`` (K, 3); ``attitude`` (K, 4): w x y z
     of bodies with x forward, y left, z up; ``plan`` (K, KNOTS, 6): position and velocity at the knots, the
-    last one repeated; ``target`` (3,); ``moving`` (M, 3); ``states`` (K,).
+    last one repeated; ``target`` (3,); ``moving`` (M, 3); ``states`` (K,); ``views`` (K, 12): of cameras, see
+    ``camera_view``, or (0, 12) without any.
     """
 
     time: float
@@ -44,6 +47,7 @@ class Snapshot(NamedTuple):
     target: Single
     moving: Single
     states: tuple[State, ...]
+    views: Single = NO_VIEWS
 
 
 class Pair(NamedTuple):

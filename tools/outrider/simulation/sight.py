@@ -11,20 +11,22 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config.companion import Moving, Obstacle
 from companion.config.obstacles import MovingSphere, Sphere
-from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.frames import FleetFrame, ned_to_enu
 from mavlink_bridge.messages import HilState, Source
 from mavlink_bridge.network.simulated import Channel, Faults
 from mavlink_bridge.node import Datagram, Node
 from mavlink_bridge.wire.codec import Codec
+from outrider.scene.camera_view import NO_VIEW, Single, view_row
 from outrider.simulation.paths import Array
 from sitl.camera.occlusion import Ball, Body, Column, Ground, Point
 from sitl.camera.scene import LINK, Scene
+from sitl.node import Autopilot
 
 CHANNEL = "sight"
 DELAY_US = 20_000
 """µs: no less than the time between two exchanges of a flight's processes, and less than cameras take."""
-_GROUND_M = 0.05
-"""m below the ground: the foot of an object that stands on the ground is not hidden by it."""
+_GROUND_M = 0.1
+"""m below the origin: the ground is as far below it as a vehicle's centre is above the ground."""
 _HERE = (0.0, 0.0, 0.0)
 
 
@@ -72,6 +74,16 @@ def scene(
         else:
             bodies[one.system] = _column((0.0, 0.0), one.radius, one.height)
     return Scene(target, (Ground(_GROUND_M), *map(_fixed, obstacles)), bodies)
+
+
+def view_of(autopilot: Autopilot) -> Single:
+    """Return the row of the vehicle's camera: where it truly was and looked in its last image."""
+    camera = autopilot.camera
+    if camera is None or camera.last is None:
+        return NO_VIEW
+    view, detected = camera.last
+    found = None if detected is None else ned_to_enu(detected)
+    return view_row(ned_to_enu(view.place), view.attitude, camera.config.pinhole.fields, found)
 
 
 def _fixed(obstacle: Obstacle) -> Body:

@@ -20,12 +20,14 @@ from outrider.runs.ground_truth import Array
 from outrider.runs.recorder import Recorder
 from outrider.scenarios.faults import Vanish
 from outrider.scenarios.links import PartitionPart
+from outrider.scene.camera_view import NO_VIEW, Single
 from outrider.scene.changes import Change
 from outrider.scene.companion_snapshot import CompanionSnapshot, companion_snapshot
 from outrider.scene.view_commands import LOSSY, ViewCommands
 from outrider.simulation.disturbances import Event, events, strike_autopilot, strike_computer
 from outrider.simulation.ending_companion import EndingCompanion
 from outrider.simulation.fleet import Fleet
+from outrider.simulation.sight import view_of
 from outrider.simulation.system_clocks import step_clock
 from outrider.simulation.truth_observer import MotionObserver, Motions
 
@@ -59,11 +61,15 @@ class Part(NamedTuple):
 
 
 class VehicleSnapshot(NamedTuple):
-    """Snapshot of a vehicle: true position (3,), m, and attitude (4,), NED, and that of its companion."""
+    """Snapshot of a vehicle: true position (3,), m, and attitude (4,), NED, and that of its companion.
+
+    ``view``: row of its camera, see ``camera_view``.
+    """
 
     position: Array
     attitude: Array
     companion: CompanionSnapshot
+    view: Single = NO_VIEW
 
 
 class Elsewhere:
@@ -177,7 +183,7 @@ class Vehicles:
     def snapshots(self, now: int) -> list[VehicleSnapshot]:
         """Return the snapshots of the vehicles at ``now`` (µs), without a change of their states."""
         return [
-            VehicleSnapshot(a.state.position, a.state.attitude, companion_snapshot(c, now))
+            VehicleSnapshot(a.state.position, a.state.attitude, companion_snapshot(c, now), view_of(a))
             for a, c in zip(self.autopilots, self.companions, strict=True)
         ]
 

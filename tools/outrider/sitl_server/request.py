@@ -11,12 +11,16 @@ from typing import Final, Literal, cast, get_args
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key
 from mavlink_bridge.messages import Vector
+from mavlink_bridge.node import Node
 from mavlink_bridge.wire.signing import Signing
 from outrider.errors import InputError
 from outrider.key_files import key_of
 from outrider.resources import find
+from outrider.scenarios.cameras import CameraFile
 from outrider.scenarios.options import wind_of
-from outrider.scenarios.places import Origin
+from outrider.scenarios.places import Origin, PathTarget
+from outrider.simulation import sight
+from outrider.simulation.targets import StandingTarget, Target, Walking
 from outrider.yaml_files.yaml_file import load
 from sitl.autopilot.saved import Saved
 from sitl.backends.physics import PhysicsName
@@ -58,6 +62,7 @@ class Options:
     speedup: float = 1.0
     seed: int = 1
     signing_key: Path | None = None
+    camera: str | None = None
 
 
 @dataclass(frozen=True)
@@ -67,6 +72,7 @@ class Request:
     ``speed``: simulated seconds per second of wall time. ``spacing``: distance (m) between neighbours on the
     start grid; ``columns``: vehicles in a row of the grid, whose first vehicle is at ``origin``. ``key``: if
     given, vehicles sign with it and accept only messages signed with it, except those of telemetry radios.
+    ``camera``: what the vehicles' cameras are and see, None without.
     """
 
     count: int
@@ -84,6 +90,7 @@ class Request:
     speed: float
     seed: int
     key: Key | None = None
+    camera: CameraFile | None = None
 
     @property
     def systems(self) -> range:
@@ -104,15 +111,40 @@ class Request:
 
     def autopilot(self, index: int, epoch: int, saved: Saved) -> Autopilot:
         """Return vehicle ``index`` (from 0), which boots at ``epoch`` (Unix µs) with the state ``saved``."""
+        vehicle, scene = self.vehicle, None
+        if self.camera is not None:
+            vehicle = vehicle.model_copy(update={"camera": self.camera.camera})
+            radius, own = 0.5 * vehicle.span, self.first_id + index
+            others = {system: radius for system in self.systems if system != own}
+            scene = sight.scene(self.target_system, self.camera.obstacles, (), others)
         return Autopilot(
             self._config(index, epoch),
-            self.vehicle,
+            vehicle,
             self.frame,
             self.seed,
             weather=self.weather,
             saved=saved,
             signing=None if self.key is None else Signing(self.key),
+            scene=scene,
         )
+
+    @property
+    def target_system(self) -> int:
+        """System id of the tracked object, in the ground truth alone: none of the vehicles'."""
+        return next(system for system in range(MOST_ID + 1, 0, -1) if system not in self.systems)
+
+    def target(self) -> Node | None:
+        """Return the tracked object, which shows itself to the cameras; None without cameras."""
+        if self.camera is None:
+            return None
+        config = self.camera.target
+        node: Target = (
+            Walking(config, self.frame)
+            if isinstance(config, PathTarget)
+            else StandingTarget(config, self.frame)
+        )
+        node.begin(0)
+        return sight.Shown(node, self.target_system, node.position, self.frame)
 
     def _config(self, index: int, epoch: int) -> AutopilotConfig:
         latitude, longitude, altitude = self.frame.to_geodetic(self.place(index))
@@ -192,6 +224,7 @@ def checked(options: Options) -> Request:
         options.speedup,
         options.seed,
         None if options.signing_key is None else key_of(options.signing_key),
+        None if options.camera is None else load(find("cameras", options.camera), CameraFile),
     )
 
 

@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from mavlink_bridge.frames import ned_to_enu
-from mavlink_bridge.node import Datagram
+from mavlink_bridge.node import Datagram, Node
 from outrider.errors import OutriderError
 from outrider.sitl_server.shared_page import SharedPage, VehicleSnapshot
 from outrider.sitl_server.traffic import Traffic
+from sitl.camera.scene import LINK as SIGHT
 from sitl.node import LINK, Autopilot
 
 SPREAD: Final = 240_000
@@ -56,12 +57,16 @@ class VehicleGroup:
         first_id: int,
         board: SharedPage,
         speed: float,
+        target: Node | None = None,
     ) -> None:
         """Create a group.
 
         ``vehicles`` and ``boots`` (boot times, µs): by index among all vehicles, which is the row on the
-        ``board``. ``first_id``: system id of index 0. ``speed``: simulated seconds per second.
+        ``board``. ``first_id``: system id of index 0. ``speed``: simulated seconds per second. ``target``
+        shows itself to the vehicles' cameras.
         """
+        self._target = target
+        self._light: list[Datagram] = []
         self.slots = [Slot(index, node, first_id + index, boots[index]) for index, node in vehicles.items()]
         self._board = board
         self._shown = round(SHOWN * 1e6 * speed)
@@ -72,6 +77,10 @@ class VehicleGroup:
         for link, data in inbox:
             mail.setdefault(link, []).append(Datagram(LINK, data))
         leaving = []
+        # Cameras see where the target is now, and where this group's vehicles were after their last step.
+        light, self._light = self._light, []
+        if self._target is not None:
+            light += [shown for shown in self._target.step(now, []) if shown.link == SIGHT]
         for slot in self.slots:
             if now < slot.boot:
                 continue
@@ -83,10 +92,13 @@ class VehicleGroup:
                 late = not slot.booted and now > slot.boot
                 said = slot.node.step(slot.boot, []) if late else []
                 slot.booted = True
-                said += slot.node.step(now, arrived)
+                said += slot.node.step(now, [*arrived, *light])
             except Exception as error:
                 raise OutriderError(f"vehicle {slot.system}: {type(error).__name__}: {error}") from error
             for datagram in said:
+                if datagram.link == SIGHT:
+                    self._light.append(datagram)
+                    continue
                 slot.traffic.send(datagram.data)
                 leaving.append(Datagram(slot.link, datagram.data))
         return leaving

@@ -80,7 +80,7 @@ class Worker:
             for index, boot in boots.items()
         }
         clients = Clients(self.links, wall)
-        group = VehicleGroup(vehicles, boots, asked.first_id, self._board, asked.speed)
+        group = VehicleGroup(vehicles, boots, asked.first_id, self._board, asked.speed, asked.target())
         with IdleCollector() as garbage:
             loop = RealTime(
                 Scheduled(group, period(asked.speed)),

@@ -64,4 +64,5 @@ def moment(flight: Flight, now: int) -> Snapshot:
         np.full(3, np.nan, np.float32) if target is None else target.astype(np.float32),
         np.array(moving, dtype=np.float32).reshape(-1, 3),
         tuple(one.state for one in seen),
+        np.array([one.view for one in vehicles]),
     )

@@ -18,6 +18,7 @@ from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 from outrider.logs.flight_modes import is_armed, reported_mode
+from outrider.scene.camera_view import NO_VIEW, CameraReceiver
 from outrider.scene.scene import LEAST_REACH, Scene
 from outrider.scene.snapshot import NO_PLAN, Array, Single, Snapshot, State, euler_attitude, padded
 from outrider.scene.view_commands import ViewCommands
@@ -37,6 +38,8 @@ _ACCEPTED = {
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
     mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
     mavlink.MAVLINK_MSG_ID_TUNNEL,
+    mavlink.MAVLINK_MSG_ID_CAMERA_FOV_STATUS,
+    mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS,
 }
 _SAMPLES = 101
 
@@ -60,6 +63,12 @@ class _Received:
         self.beat: Heartbeat | None = None
         self.plan_ms = float("nan")
         self.held: int | None = None
+        self.camera = CameraReceiver()
+        self.seen = -np.inf
+
+    def view(self, wall: float) -> Single:
+        """Return the row (12,) of its camera; NaN if it is out of date."""
+        return self.camera.row if wall - self.seen < FRESH else NO_VIEW
 
     def flown(self, wall: float) -> Single:
         """Return the plan (KNOTS, 6); NaN if it is out of date or the vehicle has reported to be disarmed."""
@@ -128,7 +137,9 @@ class Listener:
         received = self._received.get(system)
         if received is None:
             return
-        if isinstance(message, Attitude):
+        if self._frame is not None and received.camera.receive(message, self._frame):
+            received.seen = wall
+        elif isinstance(message, Attitude):
             received.attitude_times = wall
             received.attitude = euler_attitude(message.roll, message.pitch, message.yaw)
         elif isinstance(message, Heartbeat):
@@ -199,6 +210,7 @@ class Listener:
             np.array(np.full(3, np.nan) if target is None else _carried(target.fix, wall), np.float32),
             np.empty((0, 3), np.float32),
             tuple(State(one.mode, wall - one.fix.at, one.plan_ms, one.held) for one in shown),
+            np.array([one.view(wall) for one in shown]),
         )
 
 

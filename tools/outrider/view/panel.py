@@ -204,7 +204,7 @@ class Panel:
 
     def _add_layers(self) -> None:
         gui, scene = self._gui, self._stage.scene
-        known = {"trails": "Trails", "plans": "Plans", "labels": "Labels"}
+        known = {"trails": "Trails", "plans": "Plans", "labels": "Labels", "views": "Cameras"}
         if scene.d_min is not None:
             known["shells"] = "d_min: shells that touch"
         if scene.d_safe is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mavlink_bridge.frames import FleetFrame
 from outrider.errors import Fault, InputError
 from outrider.resources import find
 from outrider.runs import names
@@ -102,6 +103,7 @@ class Player:
             motion.target[row],
             motion.moving[row],
             tuple(self._state(k, time, now) for k in range(len(self.scene.systems))),
+            np.array([one.view(now) for one in self._records]),
         )
 
     def _attitude(self, row: int, k: int, now: int) -> np.ndarray:
@@ -131,13 +133,14 @@ def load(directory: Path, watch: Watch = lambda _what, _share: None) -> Player:
     scene = staged(scenario, run.seed, _span(scenario), frozenset({"pace"}))
     paths = [directory / names.log(system) for system in scenario.systems]
     whole = max(sum(path.stat().st_size for path in paths if path.exists()), 1)
-    records, done = [], 0
+    origin, records, done = scenario.origin, [], 0
+    frame = FleetFrame(origin.latitude, origin.longitude, origin.altitude)
     for system, path in zip(scenario.systems, paths, strict=True):
 
         def at(read_bytes: int, name: str = path.name, before: int = done) -> None:
             watch(name, (before + read_bytes) / whole)
 
-        records.append(record(path, system, at))
+        records.append(record(path, system, frame, at))
         done += path.stat().st_size if path.exists() else 0
     return Player(scene, run.motion, records, run.plan_times)
 

@@ -13,12 +13,14 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.avoidance.certified.committed import horizon_of
 from companion.flight.vehicle import HEARTBEAT_LOST
 from mavlink_bridge.errors import LogError, PlanWireError
+from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Attitude, GlobalPosition, Heartbeat, Message, Source, Tunnel
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, unpack
 from outrider.logs.flight_modes import is_armed, reported_mode
 from outrider.runs import names
+from outrider.scene.camera_view import NO_VIEW, CameraReceiver
 from outrider.scene.snapshot import NO_PLAN, Array, Single, euler_attitude, padded
 
 FRESH = 1_000_000
@@ -28,6 +30,8 @@ _DECODED = {
     mavlink.MAVLINK_MSG_ID_ATTITUDE,
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
     mavlink.MAVLINK_MSG_ID_TUNNEL,
+    mavlink.MAVLINK_MSG_ID_CAMERA_FOV_STATUS,
+    mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS,
 }
 _SWARM, _AUTOPILOT = names.LINK_NUMBERS["swarm"], names.LINK_NUMBERS["autopilot"]
 _PROGRESS_RECORDS = 4096
@@ -38,7 +42,8 @@ class Record(NamedTuple):
 
     ``epochs`` belong to ``plans`` (KNOTS, 6), ``attitude_times`` to the attitudes (4,), FLU in ENU, and
     ``heartbeat_times`` to the heartbeats; attitudes and heartbeats are those of its autopilot. ``received``
-    has the times of the positions received from each other vehicle.
+    has the times of the positions received from each other vehicle. ``view_times`` belong to ``views`` (12,),
+    the rows of its camera.
     """
 
     epochs: list[int]
@@ -48,6 +53,13 @@ class Record(NamedTuple):
     heartbeat_times: list[int]
     beats: list[Heartbeat]
     received: dict[int, list[int]]
+    view_times: list[int]
+    views: list[Single]
+
+    def view(self, now: int) -> Single:
+        """Return the row (12,) of the camera at ``now`` (µs); NaN if none is recent."""
+        index = bisect_right(self.view_times, now) - 1
+        return NO_VIEW if index < 0 or now - self.view_times[index] > FRESH else self.views[index]
 
     def plan(self, now: int) -> Single:
         """Return the plan flown at ``now`` (µs).
@@ -79,13 +91,15 @@ class Record(NamedTuple):
         return 1e-6 * (now - min(last)) if last else float("nan")
 
 
-def record(path: Path, owner: int, at: Callable[[int], None] = lambda _bytes: None) -> Record:
-    """Read the data of the vehicle ``owner`` from the log at ``path``.
+def record(
+    path: Path, owner: int, frame: FleetFrame, at: Callable[[int], None] = lambda _bytes: None
+) -> Record:
+    """Read the data of the vehicle ``owner`` from the log at ``path``, with positions in ``frame``.
 
     ``at`` is called with the number of bytes read. Missing or damaged records are omitted.
     """
     codec = Codec(lambda identifier, _system, _component: identifier in _DECODED)
-    found = Record([], [], [], [], [], [], {})
+    found, camera = Record([], [], [], [], [], [], {}, [], []), CameraReceiver()
     size = 0
     try:
         for number, one in enumerate(read_tlog(path)):
@@ -95,6 +109,8 @@ def record(path: Path, owner: int, at: Callable[[int], None] = lambda _bytes: No
             if one.link in (_SWARM, _AUTOPILOT):
                 for message in codec.feed(one.frame, whole=True):
                     _take(found, owner, one.time, one.link, message)
+                    if one.link == _AUTOPILOT:
+                        _look(found, camera, owner, one.time, message, frame)
     except LogError:
         return found
     order = np.argsort(found.epochs, kind="stable").tolist()
@@ -103,6 +119,15 @@ def record(path: Path, owner: int, at: Callable[[int], None] = lambda _bytes: No
         plans=[found.plans[i] for i in order],
         received={system: sorted(times) for system, times in found.received.items()},
     )
+
+
+def _look(
+    found: Record, camera: CameraReceiver, owner: int, time: int, message: Message, frame: FleetFrame
+) -> None:
+    late = found.view_times and time < found.view_times[-1]
+    if message.source.system == owner and not late and camera.receive(message, frame):
+        found.view_times.append(time)
+        found.views.append(camera.row)
 
 
 def _take(found: Record, owner: int, time: int, link: int, message: Message) -> None:

@@ -9,6 +9,7 @@ import viser
 from numpy.typing import NDArray
 
 from outrider.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, linear, rgb
+from outrider.scene.camera_view import field_lines, rays
 from outrider.scene.scene import Scene, Solid
 from outrider.scene.snapshot import Array, Single, Snapshot
 from outrider.view import shapes
@@ -25,6 +26,8 @@ _MAX_SIZE_FACTOR, _SIZE_SHARE = 3.0, 0.09
 It is the larger of the vehicle's span and the second value times the scene's reach, but at most the first
 value times the span.
 """
+_VIEW_SHARE = 0.18
+"""Length of a drawn field of view, as a share of the scene's reach."""
 _TARGET = rgb("#17202a")
 _IDENTITY = (1.0, 0.0, 0.0, 0.0)
 _NO_LINE = np.zeros((1, 2, 3))
@@ -39,6 +42,7 @@ class Layers(NamedTuple):
     reach: bool = False
     planes: bool = True
     labels: bool = True
+    views: bool = True
 
 
 class Renderer:
@@ -90,6 +94,12 @@ class Renderer:
         self._drops = stage.add_line_segments(
             f"{WORLD}/drops", _NO_LINE, SOLID, thickness=1.0, thickness_units="screen"
         )
+        self._views = stage.add_line_segments(
+            f"{WORLD}/views", _NO_LINE, _NO_LINE.astype(np.uint8), thickness=1.2, thickness_units="screen"
+        )
+        self._rays = stage.add_line_segments(
+            f"{WORLD}/rays", _NO_LINE, _NO_LINE.astype(np.uint8), thickness=2.0, thickness_units="screen"
+        )
         self._trails = Trails(stage, f"{WORLD}/trails", self._colours, 2.0)
         self._labels = [
             stage.add_label(
@@ -120,6 +130,7 @@ class Renderer:
         self._trails.show(layers.trails)
         self._plans.visible = layers.plans
         self._shells.visible = layers.shells and scene.d_min is not None
+        self._views.visible = self._rays.visible = layers.views
         self._reach.visible = layers.reach and scene.d_safe is not None
         self._planes.visible = layers.planes and scene.step_s is not None
         for label in self._labels:
@@ -139,6 +150,8 @@ class Renderer:
         for label, at in zip(self._labels, place.tolist(), strict=True):
             label.position = (at[0], at[1], at[2] + 0.45 * self.size)
         self._draw_plans(moment)
+        if len(moment.views):
+            self._draw_views(moment)
         ground = moment.position[there] * np.array((1.0, 1.0, 0.0), np.float32)
         self._drops.points = np.stack([moment.position[there], ground], axis=1)
         self._target.visible = bool(np.isfinite(moment.target).all())
@@ -163,6 +176,18 @@ class Renderer:
         known = np.isfinite(moment.plan).all(axis=(1, 2))
         found = between(moment.plan[known], self.scene.step_s)
         self._planes.batched_positions, self._planes.batched_wxyzs = _pool(found)
+
+    def _draw_views(self, moment: Snapshot) -> None:
+        """Draw the fields of view of cameras, and rays to what they detect."""
+        fields = field_lines(moment.views, _VIEW_SHARE * self.scene.reach)
+        for handle, lines in (
+            (self._views, fields),
+            (self._rays, rays(moment.views, moment.position)[:, None]),
+        ):
+            there = np.isfinite(lines).all(axis=(2, 3))
+            paint = np.broadcast_to(self._colours[:, None, None], lines.shape)
+            handle.colors = np.ascontiguousarray(paint[there])
+            handle.points = lines[there]
 
     def _follow(self, middle: Single) -> None:
         """Move the focus a part of the way to ``middle`` (3,), so that the picture does not shake."""

@@ -45,6 +45,8 @@ const flight = run && {
   tilt: decode(run.tilt),
   target: decode(run.target),
   moving: decode(run.moving),
+  axis: run.cameras && decode(run.cameras.axis),
+  seen: run.cameras && decode(run.cameras.seen),
 };
 
 // Where a time lies: between which samples, and how far from the first to the second.

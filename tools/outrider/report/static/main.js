@@ -9,6 +9,7 @@ function start() {
   for (const one of run.charts) $("charts").append(chart(one));
   if (run.spent) $("charts").append(histogram(run.spent));
   vehicleButtons();
+  $("sighted").hidden = !run.cameras;
   controls();
   watch(changed);
   mix();
@@ -80,7 +81,7 @@ function controls() {
     if (event.target.value === "all") span(flight.time[0], flight.time[flight.time.length - 1]);
     else span(run.from, run.to);
   });
-  for (const name of ["spheres", "references", "ids"]) {
+  for (const name of ["spheres", "references", "ids", "cameras"]) {
     $(name).addEventListener("change", (event) => {
       show[name] = event.target.checked;
       redraw();

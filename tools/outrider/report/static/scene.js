@@ -1,6 +1,6 @@
 // What is seen at a time: a list of things with their depths, drawn from far to near.
 
-const show = { trail: 5, spheres: true, references: true, ids: true };
+const show = { trail: 5, spheres: true, references: true, ids: true, cameras: true };
 
 function scene(g, time) {
   const here = place(time);
@@ -18,6 +18,7 @@ function scene(g, time) {
   const pair = nearestPair(places);
   if (pair) nearest(g, add, places, pair);
   places.forEach((point, k) => point && vehicle(g, add, point, k, here, time));
+  if (run.cameras && show.cameras) places.forEach((point, k) => point && sight(g, add, point, k, here));
   things.sort((a, b) => b.depth - a.depth);
   for (const { draw } of things) draw();
   if (show.ids) places.forEach((point, k) => point && label(g, point, String(flight.systems[k]), colourOf(k)));
