@@ -15,6 +15,7 @@ from companion.avoidance.field.methods import Influence, Method, Scene
 from companion.avoidance.field.methods.approach_angle import ApproachAngle
 from companion.avoidance.field.methods.swivel import Swivel
 from companion.avoidance.field.methods.tangential import Tangential
+from companion.avoidance.field.walls import Walls
 from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig, MethodName
 from companion.surfaces import Surface
@@ -66,7 +67,7 @@ class Planner:
 
     def __init__(self, config: CompanionConfig) -> None:
         self.config = config
-        self.dqmpc = Dqmpc(config.horizon, config.cost, config.limits.within(config.field.margin(1)))
+        self._limit(config.limits.within(config.field.margin(1)))
         self._methods = build(config)
         self._gradient: Array = np.zeros(3)
         self._force: Array = np.zeros((config.horizon.steps + 1, 3))
@@ -80,8 +81,13 @@ class Planner:
     def keep(self, limits: LimitsConfig) -> None:
         """Keep other ``limits`` from the next plan on, with nothing latched."""
         self.config = config = self.config.model_copy(update={"limits": limits})
-        self.dqmpc = Dqmpc(config.horizon, config.cost, limits.within(config.field.margin(1)))
+        self._limit(limits.within(config.field.margin(1)))
         self._methods = build(config)
+
+    def _limit(self, limits: LimitsConfig) -> None:
+        """Plan within ``limits``."""
+        self.dqmpc = Dqmpc(self.config.horizon, self.config.cost, limits)
+        self._walls = Walls(limits, self.dqmpc.dt)
 
     def plan(
         self,
@@ -124,6 +130,7 @@ class Planner:
             None if self.config.limits.j_max is None else Flown(acceleration, elapsed),
         )
         solution = self.dqmpc.solve(problem, influence.omega_scale)
+        self._walls.keep(position, velocity, acceleration, elapsed, solution.acceleration)
         horizon = roll_out(now, self.config.horizon.dt_us, position, velocity, solution.acceleration)
         end = horizon.knots[-1]
         self._gradient = self.dqmpc.gradient(
