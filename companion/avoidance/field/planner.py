@@ -87,7 +87,8 @@ class Planner:
     def _limit(self, limits: LimitsConfig) -> None:
         """Plan within ``limits``."""
         self.dqmpc = Dqmpc(self.config.horizon, self.config.cost, limits)
-        self._walls = Walls(limits, self.dqmpc.dt)
+        flown_us = self.config.guard.hold_us + self.config.rates.replan_us
+        self._walls = Walls(limits, self.dqmpc.dt, 1e-6 * flown_us)
 
     def plan(
         self,

@@ -2,8 +2,8 @@
 
 The QPs look only as far as the horizon, and where their constraints contradict each other, as a field that
 turns in an instant can make them, they give up state limits. Here no limit is given up. A plan is amended on
-an axis where it leaves the box or exceeds v_max, or where its first step leads to a state from which the
-vehicle could not stop before the wall. The plan then moves towards the wall no faster than it can stop, and
+an axis where it leaves the box or exceeds v_max within the time for which it may be flown, or where its first
+step leads to a state from which the vehicle could not stop before the wall. The plan then moves towards the wall no faster than it can stop, and
 along the wall as the QPs say: the push through the wall is dropped, and the way out is sideways.
 
 Stopping counts on 1/√3 of ``a_total`` at most, which a vehicle has on all axes at once, and never more than
@@ -12,7 +12,7 @@ the larger of u_max and half of ``a_total``. A plan that begins beyond a wall is
 
 from __future__ import annotations
 
-from math import sqrt
+from math import ceil, sqrt
 
 import numpy as np
 
@@ -26,9 +26,13 @@ _HALVINGS = 40
 
 
 class Walls:
-    """Walls of the box of ``limits`` and its v_max, for plans in steps of ``dt`` (s)."""
+    """Walls of the box of ``limits`` and its v_max, for plans in steps of ``dt`` (s).
 
-    def __init__(self, limits: LimitsConfig, dt: float) -> None:
+    A plan is flown for ``flown_s`` (s) at most.
+    """
+
+    def __init__(self, limits: LimitsConfig, dt: float, flown_s: float) -> None:
+        self._checked = ceil(flown_s / dt) + 1
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self._fastest = np.array(limits.v_max)
         self._a_total, self._dt = limits.a_total, dt
@@ -44,7 +48,7 @@ class Walls:
         """
         step = min(elapsed, self._dt)
         limits = self._low, self._high, self._fastest, self._braking, self._jerk
-        return _keep(x, v, flown, *limits, self._a_total, self._dt, step, a)
+        return _keep(x, v, flown, *limits, self._a_total, self._dt, step, self._checked, a)
 
 
 @part
@@ -100,15 +104,24 @@ def _slowed(
 
 @part
 def _binds(
-    x: float, v: float, low: float, high: float, fastest: float, braking: float, jerk: float, dt: float, a: Array
+    x: float,
+    v: float,
+    low: float,
+    high: float,
+    fastest: float,
+    braking: float,
+    jerk: float,
+    dt: float,
+    checked: int,
+    a: Array,
 ) -> bool:
-    """Return whether accelerations ``a`` (n,) break a limit, or begin with a step that will."""
+    """Return whether ``a`` (n,) breaks a limit in the first ``checked`` steps, or begins with one that will."""
     below, above = min(low, x), max(high, x)
     if not _safe(x - below, -v, -a[0], fastest, braking, jerk, dt):
         return True
     if not _safe(above - x, v, a[0], fastest, braking, jerk, dt):
         return True
-    for k in range(len(a)):
+    for k in range(min(checked, len(a))):
         x += dt * (v + 0.5 * dt * a[k])
         v += dt * a[k]
         if x < below - _TOLERANCE or x > above + _TOLERANCE or abs(v) > fastest + _TOLERANCE:
@@ -116,7 +129,7 @@ def _binds(
     return False
 
 
-@kernel(INT, *[array(1)] * 8, *[FLOAT] * 3, output(2))
+@kernel(INT, *[array(1)] * 8, *[FLOAT] * 3, INT, output(2))
 def _keep(
     place: Array,
     velocity: Array,
@@ -129,6 +142,7 @@ def _keep(
     a_total: float,
     dt: float,
     step: float,
+    checked: int,
     a: Array,
 ) -> int:
     """Amend ``a`` (n, 3) as ``Walls.keep`` says; ``step`` (s) is the time for the first change."""
@@ -138,7 +152,7 @@ def _keep(
         x, v, fastest, braking, jerk = place[i], velocity[i], speeds[i], brakings[i], jerks[i]
         for k in range(n):
             axis[k] = a[k, i]
-        if not _binds(x, v, lowest[i], highest[i], fastest, braking, jerk, dt, axis):
+        if not _binds(x, v, lowest[i], highest[i], fastest, braking, jerk, dt, checked, axis):
             continue
         amended |= 1 << i
         below, above = min(lowest[i], x), max(highest[i], x)
