@@ -162,7 +162,10 @@ class Planner:
         influence = Influence(field, 1.0, scene.destination)
         for method in self._methods:
             influence = method.influence(scene, influence)
-        force = self._smoothed(elapsed, influence.force)
+        force = influence.force
+        if not config.planar:
+            force = self._walls.aside(force, scene.prediction[:, 2], scene.velocity, scene.to_go)
+        force = self._smoothed(elapsed, force)
         return Influence(force, influence.omega_scale, influence.destination)
 
     def _smoothed(self, elapsed: float, force: Array) -> Array:

@@ -3,8 +3,10 @@
 The QPs look only as far as the horizon, and where their constraints contradict each other, as a field that
 turns in an instant can make them, they give up state limits. Here no limit is given up. A plan is amended on
 an axis where it leaves the box or exceeds v_max within the time for which it may be flown, or where its first
-step leads to a state from which the vehicle could not stop before the wall. The plan then moves towards the wall no faster than it can stop, and
-along the wall as the QPs say: the push through the wall is dropped, and the way out is sideways.
+step leads to a state from which the vehicle could not stop before the wall. The plan then moves towards the
+wall no faster than it can stop, and along the wall as the QPs say: the push through the wall is dropped.
+
+Near the floor the field itself is turned: what pushes down pushes sideways (``aside``).
 
 Stopping counts on 1/√3 of ``a_total`` at most, which a vehicle has on all axes at once, and never more than
 the larger of u_max and half of ``a_total``. A plan that begins beyond a wall is kept from going further.
@@ -23,6 +25,12 @@ from companion.values.horizon import Array
 _TOLERANCE = 1e-6
 """Violation (m, m/s) that is tolerated: far below what can be measured."""
 _HALVINGS = 40
+_SIDEWAYS_M = 1.5
+"""Height (m) above the floor below which a push down begins to be turned aside; at the floor all of it is."""
+_KEPT = 0.3
+"""Weight of the last direction, and of each m/s of velocity, against the push's horizontal share (0…1)."""
+_LEVEL = 1e-6
+"""A smaller sum of these has no direction."""
 
 
 class Walls:
@@ -32,6 +40,7 @@ class Walls:
     """
 
     def __init__(self, limits: LimitsConfig, dt: float, flown_s: float) -> None:
+        self._side: Array = np.zeros(2)
         self._checked = ceil(flown_s / dt) + 1
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self._fastest = np.array(limits.v_max)
@@ -39,6 +48,28 @@ class Walls:
         most = limits.a_total / sqrt(3.0)
         self._braking: Array = np.minimum(np.maximum(limits.u_max, 0.5 * limits.a_total), most)
         self._jerk = np.zeros(3) if limits.j_max is None else np.array(limits.j_max)
+
+    def aside(self, force: Array, heights: Array, velocity: Array, onward: Array) -> Array:
+        """Return the field ``force`` (N + 1, 3), m/s², with the push through the floor turned aside.
+
+        ``heights`` (N + 1,), m: where it acts. Near the floor there is no room below, so what pushes down
+        pushes sideways: where the horizontal push and ``velocity`` (3,) lead, without both towards ``onward``
+        (3,), m, and without that along +x. The direction is kept from call to call, or an obstacle exactly
+        above would push to all sides in turn.
+        """
+        if not ((heights < self._low[2] + _SIDEWAYS_M) & (force[:, 2] < 0.0)).any():
+            self._side = np.zeros(2)
+            return force
+        sizes = np.maximum(np.sqrt(np.einsum("ni,ni->n", force, force)), _LEVEL)
+        towards = (force[:, :2] / sizes[:, None]).mean(axis=0) + _KEPT * (self._side + velocity[:2])
+        for direction in (towards, onward[:2], np.array([1.0, 0.0])):
+            size = float(np.sqrt(direction @ direction))
+            if size > _LEVEL:
+                self._side = direction / size
+                break
+        share = np.minimum(np.maximum(1.0 - (heights - self._low[2]) / _SIDEWAYS_M, 0.0), 1.0)
+        push = share * np.maximum(-force[:, 2], 0.0)
+        return force + push[:, None] * np.append(self._side, 1.0)
 
     def keep(self, x: Array, v: Array, flown: Array, elapsed: float, a: Array) -> int:
         """Amend the accelerations ``a`` (n, 3), m/s², in place; return the number of amended axes.
@@ -70,9 +101,7 @@ def _stopping(v: float, a: float, braking: float, jerk: float, dt: float) -> flo
 
 
 @part
-def _safe(
-    room: float, v: float, a: float, fastest: float, braking: float, jerk: float, dt: float
-) -> bool:
+def _safe(room: float, v: float, a: float, fastest: float, braking: float, jerk: float, dt: float) -> bool:
     """Return whether a vehicle that has flown a step at ``a`` can keep the wall and the largest speed.
 
     The step began at a speed ``v``, ``room`` (m) from the wall. With a bound on jerk the speed grows until
@@ -115,7 +144,7 @@ def _binds(
     checked: int,
     a: Array,
 ) -> bool:
-    """Return whether ``a`` (n,) breaks a limit in the first ``checked`` steps, or begins with one that will."""
+    """Return whether ``a`` (n,) breaks a limit in ``checked`` steps, or begins with one that will."""
     below, above = min(low, x), max(high, x)
     if not _safe(x - below, -v, -a[0], fastest, braking, jerk, dt):
         return True

@@ -22,7 +22,15 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.key import Key
 from mavlink_bridge.links.demultiplexer import Demultiplexer
 from mavlink_bridge.links.link import memory_pair
-from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Heartbeat, Message, Source, StatusText
+from mavlink_bridge.messages import (
+    CommandAck,
+    CommandLong,
+    GlobalPosition,
+    Heartbeat,
+    Message,
+    Source,
+    StatusText,
+)
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import Header

@@ -137,7 +137,10 @@ def wire(
     clock: Clock,
     key: Key | None = None,
 ) -> Wiring:
-    """Open the links; ``key``: that of their signatures. Raises InputError if a link cannot be opened, after closing the others."""
+    """Open the links; ``key``: that of their signatures.
+
+    Raises InputError if a link cannot be opened, after closing the others.
+    """
     with ExitStack() as opened:
         demultiplexers = []
         duplicates = DuplicateIds(system, clock, key)

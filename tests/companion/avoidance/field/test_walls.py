@@ -37,7 +37,8 @@ class Adversaries:
         if self._left <= 0:
             self._left = int(chance.uniform(100_000, 1_500_000))
             count = int(chance.integers(0, 4))
-            off = chance.normal(size=(count, 3)) + [0.0, 0.0, chance.choice([0.0, 1.0, 2.0])]
+            off = chance.normal(size=(count, 3))
+            off[:, 2] += chance.choice([0.0, 1.0, 2.0])
             lengths = np.linalg.norm(off, axis=1, keepdims=True)
             self._off = off / lengths * chance.uniform(0.2, 4.0, (count, 1))
             self._speed = chance.normal(size=(count, 3)) * chance.choice([0.0, 1.0, 5.0])
@@ -84,7 +85,9 @@ def test_any_push_is_held_where_the_vehicle_can_stop(height, velocity, pushes, n
     fastest, braking = np.array(limits.v_max), limits.a_total / np.sqrt(3.0)
     position = np.array([0.0, 0.0, height])
     room = np.where(velocity < 0.0, position - limits.box_min, limits.box_max - position)
-    assume((velocity**2 / braking + 0.2 * np.abs(velocity) <= room).all() and (np.abs(velocity) <= fastest).all())
+    assume(
+        (velocity**2 / braking + 0.2 * np.abs(velocity) <= room).all() and (np.abs(velocity) <= fastest).all()
+    )
     pushed = np.array(pushes)
     pushed *= limits.a_total / np.maximum(np.linalg.norm(pushed, axis=1, keepdims=True), limits.a_total)
     kept = pushed.copy()
