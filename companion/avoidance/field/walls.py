@@ -69,7 +69,8 @@ class Walls:
                 break
         share = np.minimum(np.maximum(1.0 - (heights - self._low[2]) / _SIDEWAYS_M, 0.0), 1.0)
         push = share * np.maximum(-force[:, 2], 0.0)
-        return force + push[:, None] * np.append(self._side, 1.0)
+        turned: Array = force + push[:, None] * np.append(self._side, 1.0)
+        return turned
 
     def keep(self, x: Array, v: Array, flown: Array, elapsed: float, a: Array) -> int:
         """Amend the accelerations ``a`` (n, 3), m/s², in place; return the number of amended axes.

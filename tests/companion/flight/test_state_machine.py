@@ -308,7 +308,7 @@ def test_after_landing_nobodys_mode_is_changed_but_the_own_and_an_arducopters_ne
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("honest", [0, 1, 2], ids=["armed", "in the air", "both"])
 def test_a_stranger_in_the_autopilots_name_does_not_end_the_flight(flavour, honest):
-    """It always says that the vehicle is disarmed and on the ground, the autopilot once a second otherwise."""
+    """It says without a pause that the vehicle is disarmed on the ground, the autopilot says otherwise."""
     rig, mode = down(flavour), min(PROFILES[flavour].land_modes)
     truth = [[beat(flavour, armed=True, mode=mode)], [landed(2)]]
     for _ in range(20):
