@@ -123,7 +123,8 @@ def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
 
     It has N + 1 segments. The deceleration is the smallest of u_max, or more where that does not suffice.
     Where even a_total does not stop the vehicle in time, the steps are made longer, because a brake has as
-    many steps as a plan.
+    many steps as a plan. On an axis on which this would go through a wall of the box, the vehicle decelerates
+    as much as it takes to stop before it, with a_total at most.
     """
     n, limits = config.horizon.steps + 1, config.limits
     speed = float(np.sqrt(motion.velocity @ motion.velocity))
@@ -133,4 +134,20 @@ def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
     speeds = np.maximum(0.0, speed - rate * h * np.arange(n + 1))
     direction = motion.velocity / speed if speed > 1e-9 else np.zeros(3)
     accelerations = np.diff(speeds)[:, None] / h * direction
+    straight = roll_out(now, dt, motion.position, motion.velocity, accelerations)
+    box = limits.within(config.field.margin(1))
+    low, high = np.array(box.box_min), np.array(box.box_max)
+    end = straight.knots[-1, 0:3]
+    through = ((end < low) & (motion.velocity < 0.0)) | ((end > high) & (motion.velocity > 0.0))
+    if not through.any():
+        return straight
+    rates = rate * np.abs(direction)
+    room = np.where(motion.velocity < 0.0, motion.position - low, high - motion.position)
+    room = np.maximum(room - 0.5 * h * np.abs(motion.velocity), 1e-6)
+    left = limits.a_total**2 - float(rates[~through] @ rates[~through])
+    most = np.sqrt(max(left, 0.0) / np.count_nonzero(through))
+    needed = np.minimum(motion.velocity**2 / (2.0 * room), most)
+    rates = np.where(through, np.maximum(rates, needed), rates)
+    each = np.maximum(0.0, np.abs(motion.velocity) - rates * h * np.arange(n + 1)[:, None])
+    accelerations = np.diff(each, axis=0) / h * np.sign(motion.velocity)
     return roll_out(now, dt, motion.position, motion.velocity, accelerations)

@@ -34,6 +34,8 @@ _ARM_REPORT_US = 2_000_000
 """µs after the last arm command during which a heartbeat may still report the vehicle as disarmed."""
 _MODE_REPORT_US = 1_500_000
 """µs after the transmission of an accepted mode command; so long the mode is assumed without a heartbeat."""
+_LANDED_US = 2_500_000
+"""µs for which the vehicle is disarmed and on the ground before it has landed: more than two heartbeats."""
 _LEAVE_TIMEOUT_US = 5_000_000
 """µs after landing during which the hold mode is requested."""
 
@@ -297,15 +299,18 @@ class Pilot:
         return self._land(now, view) if self.phase is Phase.LAND else []
 
     def _land(self, now: int, view: View) -> list[Message]:
-        """Return the landing command until it takes effect; after disarming, what ``_leave`` returns.
+        """Return the landing command until it takes effect; after the landing, what ``_leave`` returns.
 
+        The vehicle has landed when its autopilot has said for ``_LANDED_US``, and nothing else, that it is
+        disarmed and on the ground: a single message may be another sender's.
         The command is not repeated after it took effect: if the autopilot then leaves its landing mode,
         another controller has ordered that. The command is not sent while the autopilot is silent, because a
         pilot may have the vehicle.
         """
         vehicle, profile = self.vehicle, self.profile
         if vehicle.heartbeat is not None and not vehicle.armed:
-            return self._leave(now, view) if vehicle.beat_at - self._arming > _ARM_REPORT_US else []
+            reported = vehicle.beat_at - self._arming > _ARM_REPORT_US
+            return self._leave(now, view) if reported and self._rests() else []
         if not vehicle.alive:
             return []
         if profile is not None and vehicle.flies:
@@ -317,6 +322,10 @@ class Pilot:
         if self._passage.entered:
             return []
         return self._commands.call(now, mavlink.MAV_CMD_NAV_LAND, (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, 0.0))
+
+    def _rests(self) -> bool:
+        """Return whether the vehicle has landed."""
+        return self._landed_at is not None or self.vehicle.rested_for >= _LANDED_US
 
     def _leave(self, now: int, view: View) -> list[Message]:
         """Return the mode command after disarming, and end the flight.

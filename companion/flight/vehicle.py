@@ -43,6 +43,8 @@ class Vehicle:
         self.status: SysStatus | None = None
         self.positioning = Positioning()
         self._extended: ExtendedSysState | None = None
+        self._contradicted = False
+        self._rested_at: int | None = None
         self._dated_heartbeat: Heartbeat | None = None
         self._dated_extended: ExtendedSysState | None = None
         self.now = self._beat_at = self._extended_at = 0
@@ -53,10 +55,12 @@ class Vehicle:
             if message.autopilot != mavlink.MAV_AUTOPILOT_INVALID:
                 self.heartbeat = message
                 self.profile = profile_of(message)
+                self._contradicted |= self.armed
         elif isinstance(message, SysStatus):
             self.status = message
         elif isinstance(message, ExtendedSysState):
             self._extended = message
+            self._contradicted |= message.landed_state != mavlink.MAV_LANDED_STATE_ON_GROUND
         elif isinstance(message, GpsRaw | EkfStatus | EstimatorStatus):
             self.positioning.receive(message)
         elif isinstance(message, StatusText):
@@ -73,6 +77,23 @@ class Vehicle:
             self._dated_heartbeat, self._beat_at = self.heartbeat, now
         if self._extended is not self._dated_extended:
             self._dated_extended, self._extended_at = self._extended, now
+        beat, extended = self.heartbeat, self._extended
+        grounded = extended is not None and extended.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
+        rests = beat is not None and not self.armed and grounded
+        if not rests or self._contradicted:
+            self._rested_at = None
+        elif self._rested_at is None:
+            self._rested_at = now
+        self._contradicted = False
+
+    @property
+    def rested_for(self) -> int:
+        """Time (µs) for which all messages have said that the vehicle is disarmed and on the ground.
+
+        It is 0 while one of the two is unknown. One message that says otherwise begins it anew: another
+        sender may use the autopilot's ids. An autopilot that has fallen silent says nothing else.
+        """
+        return 0 if self._rested_at is None else self.now - self._rested_at
 
     @property
     def beat_at(self) -> int:

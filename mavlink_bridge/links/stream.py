@@ -55,6 +55,11 @@ class Stream:
         return bool(self._waiting)
 
     @property
+    def backed_up(self) -> bool:
+        """Whether half of what may wait for the other side waits."""
+        return 2 * len(self._waiting) > self._backlog
+
+    @property
     def hung_up(self) -> bool:
         """Whether the other side is gone: the connection was closed, or the port unplugged."""
         poll = select.poll()

@@ -9,11 +9,18 @@ from typing import Any, Final
 from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.links.link import LinkCounters
 from mavlink_bridge.links.stream import Stream
+from mavlink_bridge.wire.framing import leading_frames
 
 RETRY: Final = 1_000_000
 """µs between two attempts to reconnect."""
 HUNG: Final = 30_000_000
 """µs after which a peer that takes no data is disconnected; otherwise it would occupy its place for ever."""
+MOST_FRAMES: Final = 16
+"""Largest number of frames in one datagram that is read from a stream.
+
+A receiver bounds its work by the datagram. A UDP datagram holds what its sender put together; what a read of
+a stream happens to hold must not be too much.
+"""
 _MAX_READ_BYTES: Final = 16384
 """Bytes after which one ``receive`` reads no further stream: many full streams would take long to parse."""
 
@@ -26,6 +33,9 @@ class StreamLink:
 
     A lock protects the streams, because two threads may use a link; its holder never blocks.
     """
+
+    _waits_for_readers = False
+    """Whether nothing is read from a peer while half of what may wait for it waits."""
 
     def __init__(self, clock: Clock, backlog: int) -> None:
         # The selector's own file descriptor stays the same while streams come and go.
@@ -44,7 +54,7 @@ class StreamLink:
         """Counts of datagrams.
 
         A datagram counts as sent if at least one peer takes it. The frames of one read count as one received
-        datagram.
+        datagram, or as several of ``MOST_FRAMES`` frames.
         """
         return LinkCounters(self._received, self._sent, self._dropped)
 
@@ -175,23 +185,37 @@ class StreamLink:
 
     def _serve(self, stream: Stream, found: list[bytes]) -> int:
         """Read ``stream`` once, so that a busy sender does not delay others; return the number of bytes."""
-        data = stream.read()
+        stream.flush()
+        data = None if self._waits_for_readers and stream.backed_up else stream.read()
         if data:
-            found.append(data)
+            found += _pieces(data)
         stream.flush()
         self._settle(stream)
         return len(data or b"")
 
     def _settle(self, stream: Stream) -> None:
-        """Select for writing only while data waits; close and remove a stream that is broken or hung."""
+        """Select for what will be done next; close and remove a stream that is broken or hung."""
         if not stream.alive or (stream.waits and stream.stuck(self._clock.now()) > HUNG):
             self._selector.unregister(stream)
             self._streams.remove(stream)
             stream.close()
             return
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if stream.waits else 0)
+        read = 0 if self._waits_for_readers and stream.backed_up else selectors.EVENT_READ
+        events = read | (selectors.EVENT_WRITE if stream.waits else 0)
         if self._selector.get_key(stream).events != events:
             self._selector.modify(stream, events)
+
+
+def _pieces(data: bytes) -> list[bytes]:
+    """Return ``data``, as far as it is undamaged in pieces of at most ``MOST_FRAMES`` frames."""
+    frames, _ = leading_frames(data)
+    if len(frames) <= MOST_FRAMES:
+        return [data]
+    pieces, at = [], 0
+    for first in range(0, len(frames), MOST_FRAMES):
+        begin, at = at, at + sum(len(frame.data) for frame in frames[first : first + MOST_FRAMES])
+        pieces.append(data[begin:at])
+    return [*pieces, data[at:]] if at < len(data) else pieces
 
 
 def _number(selector: selectors.BaseSelector) -> int | None:

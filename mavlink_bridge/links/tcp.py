@@ -107,7 +107,13 @@ class TcpCaller(StreamLink):
 
 
 class TcpListener(StreamLink):
-    """Link of ``tcpin``: what is sent goes to every connected peer."""
+    """Link of ``tcpin``: what is sent goes to every connected peer.
+
+    A peer that does not read what it is sent is not read from either, until it does: its requests wait in its
+    own system, and none is taken whose answer would be lost.
+    """
+
+    _waits_for_readers = True
 
     def __init__(self, endpoint: TcpIn, clock: Clock) -> None:
         family, address = resolved(endpoint, endpoint.host, endpoint.port, socket.SOCK_STREAM)

@@ -33,6 +33,7 @@ from mavlink_bridge.wire.framing import (
     Frame,
     claimed_length,
     frame_at,
+    incompatible,
     leading_frames,
     without_signature,
 )
@@ -55,7 +56,8 @@ class TlogReport(NamedTuple):
 
     - ``good``: records with a correct checksum
     - ``bad``: records with a wrong checksum, or stretches of bytes that are no record
-    - ``unknown``: records of messages that the dialect lacks, at plausible places; they are not returned
+    - ``unknown``: records of messages that the dialect lacks, or with unknown incompatibility flags, at
+      plausible places; they are not returned
     - ``skipped_bytes``: bytes in no good or unknown record
     - ``time_steps_back``: records with a time before that of the previous record
     - ``truncated``: the log ends within a record, or its compression breaks off
@@ -134,6 +136,11 @@ class TlogWriter:
         """Yield the records of ``data`` from ``at`` on, where an irregularity begins."""
         while at < len(data):
             frame = frame_at(data, at)
+            foreign = incompatible(data, at) if frame is Flaw.INCOMPATIBLE else None
+            if foreign and (foreign.verified or _is_frame_boundary(data, at + foreign.length)):
+                at += foreign.length
+                self.skipped_bytes += foreign.length
+                continue
             if isinstance(frame, Flaw) or not (frame.known or _is_frame_boundary(data, at + len(frame.data))):
                 at += 1
                 self.skipped_bytes += 1
@@ -268,7 +275,8 @@ class _Pass:
                 yield from stretch.records
                 continue
             frame = frame_at(self._window, self._at + 8)
-            if not self._step_over(unknown_message=not isinstance(frame, Flaw)):
+            intact = frame is Flaw.INCOMPATIBLE or not isinstance(frame, Flaw)
+            if not self._step_over(unknown_message=intact):
                 record = self._search(cut=frame is Flaw.PARTIAL)
                 if record is not None:
                     yield record

@@ -58,7 +58,7 @@ class Counters(NamedTuple):
 
     - ``good``: frames that were decoded to messages
     - ``bad``: false starts, wrong checksums, invalid values
-    - ``unknown``: frames with message ids that the dialect lacks
+    - ``unknown``: frames with message ids that the dialect lacks, or with unknown incompatibility flags
     - ``filtered``: valid frames that ``accept`` rejected, or of a message that ``messages`` lacks
     - ``skipped_bytes``: bytes that belong to no frame
     - ``refused``: frames that ``accept`` passed and ``signing`` refused
@@ -106,7 +106,7 @@ class Codec:
 
     @property
     def pending_bytes(self) -> int:
-        """Number of bytes of a frame that is not complete yet (at most 280)."""
+        """Number of bytes of a frame that is not complete yet (at most 288)."""
         return self._framer.pending_bytes
 
     def feed(self, data: bytes, *, whole: bool = False) -> list[Message]:

@@ -3,6 +3,10 @@
 Source: the MAVLink serialisation guide. Version 1 is ``FE len seq sys comp id payload crc``; version 2 is
 ``FD len incompat compat seq sys comp id(3) payload crc [signature(13)]``, with trailing zeros of the payload
 left out. The checksum is CRC-16/MCRF4XX over header without start byte, payload, and the message's CRC_EXTRA.
+
+Frames whose incompatibility flags are not understood are skipped whole: their payload is not searched for
+frames. Two such flags are known by their length: with 0x02 the system id has four bytes, and with 0x04 the
+target's system id (four bytes) and component id follow the message id (pymavlink pull request 1229).
 """
 
 from __future__ import annotations
@@ -20,7 +24,9 @@ from pymavlink.dialects.v20 import all as mavlink
 _MARKERS = (mavlink.PROTOCOL_MARKER_V1, mavlink.PROTOCOL_MARKER_V2)
 MAX_CACHED_BYTES = 512
 """Length of the longest datagram whose frames are cached."""
-LONGEST_FRAME = 280  # version 2: 10 header, 255 payload, 2 checksum, 13 signature
+LONGEST_FRAME = 288  # version 2: 10 header, 3 and 5 of flags, 255 payload, 2 checksum, 13 signature
+_LONG_IDS, _TARGETED = 0x02, 0x04
+"""Incompatibility flags: the system id has four bytes; the target's ids are in the header."""
 
 STARTS = re.compile(b"[\xfd\xfe]")
 _HEADER_V1 = Struct("<6B")
@@ -58,17 +64,47 @@ class Frame(NamedTuple):
 
 
 class Flaw(Enum):
-    """Reason why there is no frame: the bytes end too early, or no valid frame starts here."""
+    """Reason why there is no frame: the bytes end too early, or no valid frame starts here.
+
+    ``INCOMPATIBLE``: a frame with an incompatibility flag that is not understood, ``incompatible`` has its
+    length.
+    """
 
     PARTIAL = "partial"
     FALSE_START = "false start"
+    INCOMPATIBLE = "incompatible"
+
+
+class Incompatible(NamedTuple):
+    """Frame whose incompatibility flags are not understood.
+
+    ``length`` in bytes, by its header. ``verified``: its checksum is correct.
+    """
+
+    length: int
+    verified: bool
+
+
+def incompatible(data: bytes, start: int) -> Incompatible | None:
+    """Return the incompatible frame at ``data[start]``, which ``frame_at`` found; None if it is cut off."""
+    size, flags = len(data) - start, data[start + 2]
+    ids = start + 5 + (4 if flags & _LONG_IDS else 1) + 1
+    body = ids + 3 + (5 if flags & _TARGETED else 0)
+    end = body + data[start + 1]
+    signature: int = mavlink.MAVLINK_SIGNATURE_BLOCK_LEN if flags & mavlink.MAVLINK_IFLAG_SIGNED else 0
+    length = end + 2 + signature - start
+    if length > size:
+        return None
+    extra = CRC_EXTRA.get(int.from_bytes(data[ids : ids + 3], "little"))
+    checked = extra is not None and mcrf4xx(data[start + 1 : end] + extra) == data[end] | data[end + 1] << 8
+    return Incompatible(length, checked)
 
 
 def frame_at(data: bytes, start: int) -> Frame | Flaw:
     """Return the frame that starts at ``data[start]``, or the reason why there is none.
 
-    A wrong checksum is a false start, and so is an incompatibility flag other than *signed*, as MAVLink
-    demands: the length of such a frame is unknown.
+    A wrong checksum is a false start. A frame with an incompatibility flag other than *signed* is not read,
+    as MAVLink demands.
     """
     size = len(data)
     if start >= size:
@@ -79,7 +115,7 @@ def frame_at(data: bytes, start: int) -> Frame | Flaw:
             return Flaw.PARTIAL
         _, length, flags, _, sequence, system, component, low, high = _HEADER_V2.unpack_from(data, start)
         if flags > mavlink.MAVLINK_IFLAG_SIGNED:
-            return Flaw.FALSE_START
+            return Flaw.INCOMPATIBLE
         version, signed, message_id = 2, flags == mavlink.MAVLINK_IFLAG_SIGNED, low | high << 16
         body = start + 10
         end = body + length
@@ -142,9 +178,11 @@ def leading_frames(data: bytes) -> tuple[tuple[Frame, ...], int]:
 def claimed_length(data: bytes, start: int) -> int | None:
     """Return the frame length by the unverified header at ``data[start]``, or None if that is no header."""
     mark = data[start : start + 1]
-    if mark == b"\xfd" and start + 3 <= len(data) and data[start + 2] <= mavlink.MAVLINK_IFLAG_SIGNED:
-        signature: int = mavlink.MAVLINK_SIGNATURE_BLOCK_LEN * data[start + 2]
-        return 12 + data[start + 1] + signature
+    if mark == b"\xfd" and start + 3 <= len(data):
+        flags = data[start + 2]
+        signature: int = mavlink.MAVLINK_SIGNATURE_BLOCK_LEN * (flags & mavlink.MAVLINK_IFLAG_SIGNED)
+        ids = (3 if flags & _LONG_IDS else 0) + (5 if flags & _TARGETED else 0)
+        return 12 + ids + data[start + 1] + signature
     if mark == b"\xfe" and start + 2 <= len(data):
         return 8 + data[start + 1]
     return None
@@ -196,12 +234,13 @@ def without_signature(data: bytes) -> bytes:
 class Framer:
     """Splitter of a byte stream, in pieces of any length, into frames.
 
-    It keeps at most 280 bytes between two calls. After a false start the search continues one byte later. A
+    It keeps at most 288 bytes between two calls. After a false start the search continues one byte later. A
     frame of an unknown message cannot be verified. It is therefore accepted only if a start byte follows it
     (the framer waits for this byte); otherwise it counts as a false start. ``whole``: no frame continues in
-    the next call, so nothing waits, and an unknown frame at the end of the data is accepted. ``frames``
-    counts known frames, ``unknown`` accepted unknown ones, ``bad`` false starts, and ``skipped_bytes`` the
-    bytes that belong to no frame.
+    the next call, so nothing waits, and an unknown frame at the end of the data is accepted. A frame with
+    incompatibility flags that are not understood is skipped under the same condition, or if its checksum is
+    correct. ``frames`` counts known frames, ``unknown`` accepted unknown and skipped ones, ``bad`` false
+    starts, and ``skipped_bytes`` the bytes that belong to no frame.
     """
 
     def __init__(self, *, unknown: bool = False) -> None:
@@ -236,6 +275,18 @@ class Framer:
         size = len(data)
         while at < size:
             frame = frame_at(data, at)
+            if frame is Flaw.INCOMPATIBLE:
+                foreign = incompatible(data, at)
+                if foreign is None:
+                    frame = Flaw.PARTIAL
+                else:
+                    after = at + foreign.length
+                    if after == size and not whole and not foreign.verified:
+                        break
+                    if foreign.verified or after == size or data[after] in _MARKERS:
+                        self.unknown += 1
+                        at = after
+                        continue
             if frame is Flaw.PARTIAL and not whole:
                 break
             if not isinstance(frame, Flaw):

@@ -53,8 +53,8 @@ def _jumping(time: float, victim: Array, chance: np.random.Generator) -> Array:
 
 
 def descending(time: float, _victim: Array, _chance: np.random.Generator) -> Array:
-    """Somebody innocent who comes down on the way, to 3.6 m, and stays."""
-    return np.array([0.0, 0.0, max(8.0 - 0.8 * time, 3.6)])
+    """Somebody innocent who comes down on the way, from 12 m to 3.6 m, and stays."""
+    return np.array([0.0, 0.0, max(12.0 - 0.8 * time, 3.6)])
 
 
 ADVERSARIES: dict[str, Place] = {

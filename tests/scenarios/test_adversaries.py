@@ -25,13 +25,14 @@ FLIGHTS = [
     ("slow", "ardupilot", "exact"),
     *[(flavour, flavour, response) for flavour in ("ardupilot", "px4") for response in ("exact", "firmware")],
 ]
+LEVEL = np.array([1.0, 1.0, 0.0])
 SEEDS = [pytest.param(seed, marks=pytest.mark.slow if seed > 2 else ()) for seed in range(1, 21)]
 
 
-def flown(settings: str, flavour: str, response: str, floor: float) -> SingleVehicle:
+def flown(settings: str, flavour: str, response: str, floor: float, height: float = 8.0) -> SingleVehicle:
     limits = {**SETTINGS[settings].get("limits", {}), "box_min": [-20.0, -20.0, floor]}
     vehicle = SingleVehicle(flavour, {**SETTINGS[settings], "limits": limits}, response=response)
-    vehicle.fly(8.0)
+    vehicle.fly(height)
     return vehicle
 
 
@@ -63,7 +64,26 @@ def test_no_neighbour_presses_it_out_of_its_box(settings, flavour, response, see
 
 
 @pytest.mark.parametrize(("settings", "flavour", "response"), FLIGHTS)
-def test_one_that_comes_down_on_it_presses_it_not_through_the_floor(settings, flavour, response):
-    """It ends 0.6 m above the floor, where there is no room below it: the way out is sideways."""
-    vehicle = flown(settings, flavour, response, 3.0)
-    check(vehicle, press(vehicle, descending, 15.0, 1))
+def test_one_that_comes_down_on_it_is_evaded_sideways_and_not_through_the_floor(settings, flavour, response):
+    """It comes down exactly on a vehicle that keeps its place 2 m above the floor, and stays there."""
+    vehicle = flown(settings, flavour, response, 3.0, 5.0)
+    start = vehicle.place
+
+    def above(time: float, victim: np.ndarray, chance: np.random.Generator) -> np.ndarray:
+        return descending(time, victim, chance) + start * LEVEL
+
+    pressed = press(vehicle, above, 15.0, 1)
+    check(vehicle, pressed)
+    times, chance = 0.01 * np.arange(len(pressed.places)), np.random.default_rng(1)
+    others = np.array([above(time, start, chance) for time in times])
+    distances = np.linalg.norm(pressed.places - others, axis=1)
+    assert distances.min() > vehicle.config.field.d_min
+    assert pressed.places[:, 2].min() < 5.0 - 0.5
+
+
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_a_forged_neighbour_above_it_presses_a_shipped_companion_not_to_the_ground(flavour):
+    vehicle = flown(flavour, flavour, "firmware", 2.5, 5.0)
+    pressed = press(vehicle, ADVERSARIES["above"], 20.0, 1)
+    check(vehicle, pressed)
+    assert pressed.speeds[:, 2].min() >= -vehicle.config.limits.v_max[2]

@@ -15,6 +15,7 @@ from companion.avoidance.field.methods import Influence, Method, Scene
 from companion.avoidance.field.methods.approach_angle import ApproachAngle
 from companion.avoidance.field.methods.swivel import Swivel
 from companion.avoidance.field.methods.tangential import Tangential
+from companion.avoidance.field.walls import Walls
 from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig, MethodName
 from companion.surfaces import Surface
@@ -66,7 +67,7 @@ class Planner:
 
     def __init__(self, config: CompanionConfig) -> None:
         self.config = config
-        self.dqmpc = Dqmpc(config.horizon, config.cost, config.limits.within(config.field.margin(1)))
+        self._limit(config.limits.within(config.field.margin(1)))
         self._methods = build(config)
         self._gradient: Array = np.zeros(3)
         self._force: Array = np.zeros((config.horizon.steps + 1, 3))
@@ -80,8 +81,14 @@ class Planner:
     def keep(self, limits: LimitsConfig) -> None:
         """Keep other ``limits`` from the next plan on, with nothing latched."""
         self.config = config = self.config.model_copy(update={"limits": limits})
-        self.dqmpc = Dqmpc(config.horizon, config.cost, limits.within(config.field.margin(1)))
+        self._limit(limits.within(config.field.margin(1)))
         self._methods = build(config)
+
+    def _limit(self, limits: LimitsConfig) -> None:
+        """Plan within ``limits``."""
+        self.dqmpc = Dqmpc(self.config.horizon, self.config.cost, limits)
+        flown_us = self.config.guard.hold_us + self.config.rates.replan_us
+        self._walls = Walls(limits, self.dqmpc.dt, 1e-6 * flown_us)
 
     def plan(
         self,
@@ -124,6 +131,7 @@ class Planner:
             None if self.config.limits.j_max is None else Flown(acceleration, elapsed),
         )
         solution = self.dqmpc.solve(problem, influence.omega_scale)
+        self._walls.keep(position, velocity, acceleration, elapsed, solution.acceleration)
         horizon = roll_out(now, self.config.horizon.dt_us, position, velocity, solution.acceleration)
         end = horizon.knots[-1]
         self._gradient = self.dqmpc.gradient(
@@ -154,7 +162,10 @@ class Planner:
         influence = Influence(field, 1.0, scene.destination)
         for method in self._methods:
             influence = method.influence(scene, influence)
-        force = self._smoothed(elapsed, influence.force)
+        force = influence.force
+        if not config.planar:
+            force = self._walls.aside(force, scene.prediction[:, 2], scene.velocity, scene.to_go)
+        force = self._smoothed(elapsed, force)
         return Influence(force, influence.omega_scale, influence.destination)
 
     def _smoothed(self, elapsed: float, force: Array) -> Array:

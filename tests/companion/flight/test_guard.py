@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
@@ -12,15 +12,17 @@ from companion.flight.guard import Guard, Holding, brake
 from companion.values.horizon import Motion, roll_out
 from tests.companion.rig import LAWS, ZERO, numbers, vectors
 
-CONFIG = CompanionConfig()
+FAR = {"box_min": (-1e4, -1e4, -1e4), "box_max": (1e4, 1e4, 1e4)}
+"""Walls that no brake reaches."""
+CONFIG = CompanionConfig.model_validate({"limits": FAR})
 ESCORT = CompanionConfig.model_validate(
     {
         "horizon": {"dt_us": 80_000},
-        "limits": {"u_max": (4.0, 4.0, 4.0), "v_max": (7.0, 7.0, 7.0), "a_total": 6.9},
+        "limits": {"u_max": (4.0, 4.0, 4.0), "v_max": (7.0, 7.0, 7.0), "a_total": 6.9, **FAR},
         "tangential": {"force_max": 5.0},
     }
 )
-SHORT = CompanionConfig.model_validate({"horizon": {"dt_us": 20_000, "steps": 5}})
+SHORT = CompanionConfig.model_validate({"horizon": {"dt_us": 20_000, "steps": 5}, "limits": FAR})
 CONFIGS = st.sampled_from([CONFIG, ESCORT, SHORT])
 START = 1_767_225_600_000_000
 HOLD = CONFIG.guard.hold_us
@@ -49,6 +51,25 @@ def test_a_brake_comes_to_rest_within_its_horizon_and_limits(x, v, config):
     room = config.horizon.steps * config.horizon.dt_us * 1e-6
     if speed <= min(config.limits.u_max) * room:
         assert accelerations.max() <= min(config.limits.u_max) + 1e-9
+
+
+@LAWS
+@given(
+    x=st.tuples(numbers(-20.0, 20.0), numbers(-20.0, 20.0), numbers(3.0, 10.0)),
+    v=vectors(5.0),
+    jerk=st.sampled_from([None, (3.5, 3.5, 3.5)]),
+)
+def test_a_brake_ends_before_the_wall_where_the_vehicle_can_stop_before_it(x, v, jerk):
+    config = CompanionConfig.model_validate({"limits": {"j_max": jerk}})
+    limits = config.limits
+    low, high = np.array(limits.box_min), np.array(limits.box_max)
+    room = np.where(v < 0.0, np.array(x) - low, high - np.array(x))
+    assume((v**2 / (2.0 * limits.a_total / np.sqrt(3.0)) + 0.1 * np.abs(v) <= room).all())
+    knots = brake(START, motion(x, v), config).knots
+    assert (knots[:, 0:3] >= low - 1e-9).all()
+    assert (knots[:, 0:3] <= high + 1e-9).all()
+    assert np.linalg.norm(knots[:, 6:9], axis=1).max() <= limits.a_total + 1e-9
+    np.testing.assert_allclose(knots[-1, 3:6], ZERO, atol=1e-9)
 
 
 @LAWS

@@ -285,13 +285,14 @@ def down(flavour):
 @pytest.mark.parametrize("acks", [True, False])
 def test_a_px4_that_has_landed_is_asked_to_hold_until_it_says_so_for_five_seconds_at_most(mode, acks):
     rig = down("px4")
+    assert rig.run(2.4, beat("px4", mode=mode), landed(1), acks=acks) == []
     sent = rig.run(1.0, beat("px4", mode=mode), landed(1), acks=acks)
     assert set(sent) == {(mavlink.MAV_CMD_DO_SET_MODE, (1.0, 4.0, 3.0, 0.0, 0.0, 0.0, 0.0))}
     assert rig.pilot.phase is Phase.LAND
     assert rig.run(1.0, beat("px4", mode=HOLD), landed(1)) == []
     assert rig.pilot.phase is Phase.DONE
     rig = down("px4")
-    rig.run(4.9, beat("px4", mode=mode), landed(1), acks=acks)
+    rig.run(7.4, beat("px4", mode=mode), landed(1), acks=acks)
     assert rig.pilot.phase is Phase.LAND
     rig.run(0.3, beat("px4", mode=mode), landed(1), acks=acks)
     assert rig.pilot.phase is Phase.DONE
@@ -300,14 +301,38 @@ def test_a_px4_that_has_landed_is_asked_to_hold_until_it_says_so_for_five_second
 def test_after_landing_nobodys_mode_is_changed_but_the_own_and_an_arducopters_never():
     for flavour, mode in (("px4", 3 << 16), ("px4", HOLD), ("ardupilot", 9), ("ardupilot", 4)):
         rig = down(flavour)
-        assert rig.run(1.0, beat(flavour, mode=mode), landed(1)) == []
+        assert rig.run(3.0, beat(flavour, mode=mode), landed(1)) == []
         assert rig.pilot.phase is Phase.DONE
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("honest", [0, 1, 2], ids=["armed", "in the air", "both"])
+def test_a_stranger_in_the_autopilots_name_does_not_end_the_flight(flavour, honest):
+    """It says without a pause that the vehicle is disarmed on the ground, the autopilot says otherwise."""
+    rig, mode = down(flavour), min(PROFILES[flavour].land_modes)
+    truth = [[beat(flavour, armed=True, mode=mode)], [landed(2)]]
+    for _ in range(20):
+        rig.run(0.98, beat(flavour, mode=mode), landed(1))
+        rig.run(0.02, *(truth[honest] if honest < 2 else truth[0] + truth[1]))
+        assert rig.pilot.phase is Phase.LAND
+    rig.run(8.0, beat(flavour, mode=mode), landed(1), acks=True)
+    assert rig.pilot.phase is Phase.DONE
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_vehicle_of_unknown_landed_state_has_not_landed(flavour):
+    rig = Rig(flavour).escorting()
+    rig.pilot.land()
+    rig.pilot.settled()
+    rig.run(3.0, beat(flavour, armed=True, guided=True))
+    rig.run(20.0, beat(flavour), landed(0))
+    assert rig.pilot.phase is Phase.LAND
 
 
 def test_a_px4_that_falls_silent_when_it_has_landed_is_not_waited_for():
     rig = down("px4")
     rig.run(0.1, beat("px4", mode=OFFBOARD), landed(1))
-    rig.run(6.0)
+    rig.run(8.0)
     assert rig.pilot.phase is Phase.DONE
 
 
@@ -366,7 +391,7 @@ def test_landing_goes_through_settling_and_ends_disarmed(flavour):
     landing = beat(flavour, armed=True, mode=min(PROFILES[flavour].land_modes))
     assert rig.run(40.0, landing, acks=True) == []
     assert rig.pilot.phase is Phase.LAND
-    rig.tick(beat(flavour))
+    rig.run(2.6, beat(flavour), landed(1))
     assert rig.pilot.phase is Phase.DONE
     assert rig.run(5.0, beat(flavour)) == []
 

@@ -383,19 +383,19 @@ def test_any_bytes_are_survived_and_accounted_for(stream: bytes, data: st.DataOb
     found = codec.feed(stream + TRAILER)
     good, bad, unknown, filtered, skipped, _ = codec.counters
     assert len(found) == good
-    assert codec.pending_bytes <= 280
+    assert codec.pending_bytes <= 288
     assert skipped + codec.pending_bytes + 8 * (good + filtered + unknown) <= len(stream + TRAILER)
-    # The longest frame has 280 bytes: garbage cannot hide more than that of what follows, unless an unknown
+    # The longest frame has 288 bytes: garbage cannot hide more than that of what follows, unless an unknown
     # message was passed over by its length.
     if unknown == 0:
-        assert found.count(POSITION) >= 20 - 280 // 40
+        assert found.count(POSITION) >= 20 - 288 // 40
     assert bad <= len(stream) + len(TRAILER)
 
 
 @given(st.binary(max_size=300))
 def test_garbage_does_not_swallow_the_frames_behind_it(garbage: bytes) -> None:
     codec = Codec()
-    padding = bytes(280)
+    padding = bytes(288)
     found = codec.feed(garbage + wire(POSITION) + wire(BEAT) + padding)
     assume(codec.counters.unknown == 0)
     assert found[-2:] == [POSITION, BEAT]

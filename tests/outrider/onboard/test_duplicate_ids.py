@@ -19,12 +19,22 @@ from companion.values.phase import Phase
 from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.clocks.followed_clock import FollowedClock
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.key import Key
 from mavlink_bridge.links.demultiplexer import Demultiplexer
 from mavlink_bridge.links.link import memory_pair
-from mavlink_bridge.messages import CommandAck, CommandLong, GlobalPosition, Message, Source, StatusText
+from mavlink_bridge.messages import (
+    CommandAck,
+    CommandLong,
+    GlobalPosition,
+    Heartbeat,
+    Message,
+    Source,
+    StatusText,
+)
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.header import Header
+from mavlink_bridge.wire.signing import Signing
 from outrider.onboard.orders import Orders
 from outrider.onboard.status import StatusReports
 from outrider.onboard.transmit_statistics import TransmitStatistics
@@ -104,6 +114,40 @@ def test_what_was_said_before_this_process_and_comes_late_is_nobody() -> None:
     air.pass_by(1.0, OWN)
     air.pass_by(1.0)
     assert not air.duplicates.seen
+
+
+@pytest.mark.parametrize(
+    ("sender", "found"),
+    [("unsigned", False), ("another key", False), ("recorded", False), ("the key", True)],
+)
+def test_on_a_signed_link_only_holders_of_the_key_count(sender: str, found: bool) -> None:
+    """A stranger blocks no go with the own ids, nor with own frames from before the start or of long ago."""
+    clock = SimulatedClock(1_700_000_000 * SECOND)
+    key = Key.of_passphrase("ours")
+    duplicates = DuplicateIds(1, clock, key)
+    signed = {"another key": Key.of_passphrase("theirs"), "unsigned": None}.get(sender, key)
+    own, theirs = Signing(key), Signing(signed)
+    mine, other = Codec(signing=own), Codec(signing=theirs)
+    recorded = []
+    for k in range(20):
+        own.present(clock.now() - 20 * SECOND)
+        recorded.append(mine.encode(heartbeat(k)))
+    for k in range(2 * REMEMBERED):
+        own.present(clock.now() + k * 100)
+        frame = mine.encode(heartbeat(k))
+        recorded.append(frame)
+        duplicates.said(frame)
+    clock.wait_until(clock.now() + 60 * SECOND)
+    for k in range(20):
+        theirs.present(clock.now())
+        long_ago = recorded[k if k < 10 else REMEMBERED // 2 + k]
+        duplicates.received(Header(*OWN, 0), long_ago if sender == "recorded" else other.encode(heartbeat(k)))
+        clock.wait_until(clock.now() + SECOND // 2)
+    assert duplicates.seen == found
+
+
+def heartbeat(mode: int) -> Heartbeat:
+    return Heartbeat(OWN, 18, 8, 0, mode, 4)
 
 
 @pytest.mark.parametrize("kind", [Companion, DryRun])

@@ -53,7 +53,7 @@ def run(asked: Request) -> int:
 
 def _live(asked: Request) -> int:
     config, began = asked.config, time.monotonic()
-    wiring = wire(asked.endpoints, config.system, config.target, config.settings, WallClock())
+    wiring = wire(asked.endpoints, config.system, config.target, config.settings, WallClock(), asked.key)
     with closing(wiring), noted(_STOPS) as stops, suspending_signals_ignored():
         directory = new_directory(asked.out, f"fly-{config.system}")
         document = config.model_dump(mode="json")

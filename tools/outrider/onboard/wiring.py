@@ -13,6 +13,7 @@ from companion.telemetry.reception import accepts
 from companion.values.components import COMPONENT
 from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.errors import LinkError, LogError
+from mavlink_bridge.key import Key
 from mavlink_bridge.links.demultiplexer import DemultiplexedLink, Demultiplexer, Wants
 from mavlink_bridge.links.endpoints import Endpoint
 from mavlink_bridge.links.link import Link
@@ -129,12 +130,20 @@ def wants(name: str, system: int, target: int, config: CompanionConfig) -> Wants
 
 
 def wire(
-    endpoints: dict[str, Endpoint], system: int, target: int, config: CompanionConfig, clock: Clock
+    endpoints: dict[str, Endpoint],
+    system: int,
+    target: int,
+    config: CompanionConfig,
+    clock: Clock,
+    key: Key | None = None,
 ) -> Wiring:
-    """Open the links. Raises InputError if a link cannot be opened, after closing the others."""
+    """Open the links; ``key``: that of their signatures.
+
+    Raises InputError if a link cannot be opened, after closing the others.
+    """
     with ExitStack() as opened:
         demultiplexers = []
-        duplicates = DuplicateIds(system, clock)
+        duplicates = DuplicateIds(system, clock, key)
         ends: dict[str, DemultiplexedLink] = {}
         for endpoint in dict.fromkeys(endpoints.values()):
             names = [name for name, other in endpoints.items() if other == endpoint]

@@ -2,17 +2,25 @@
 
 Such a sender exists if two vehicles have the same system id, and so ignore each other, or if two companions
 control one vehicle.
+
+With a key only frames that it signed count: anyone may send the own ids in an unsigned frame, or send frames
+again that were recorded.
 """
 
 from __future__ import annotations
 
+import hmac
 from collections import OrderedDict
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from companion.values.components import COMPONENT
 from mavlink_bridge.clocks.clock import Clock
+from mavlink_bridge.key import Key
 from mavlink_bridge.wire.framing import leading_frames
 from mavlink_bridge.wire.header import Header
+from mavlink_bridge.wire.signing import EPOCH, UNIT
 
 REMEMBERED: Final = 4096
 """Number of sent frames kept; more than a link sends before an echo of the first one returns."""
@@ -28,14 +36,18 @@ class DuplicateIds:
     """Detector of a duplicate on the links of the companion of ``system``.
 
     A duplicate is a sender with the companion's ids whose frames differ from each of the last
-    ``REMEMBERED`` frames of the companion itself. ``clock``: wall clock.
+    ``REMEMBERED`` frames of the companion itself. ``clock``: wall clock. With a ``key`` the frame must be
+    signed with it, and its stamp later than the start and than any frame that is no longer remembered:
+    earlier ones may be recordings of the companion itself.
     """
 
-    def __init__(self, system: int, clock: Clock) -> None:
+    def __init__(self, system: int, clock: Clock, key: Key | None = None) -> None:
         self._own = (system, COMPONENT)
-        self._clock = clock
-        self._said: OrderedDict[int, None] = OrderedDict()
-        """Hashes of sent frames, the latest at the end."""
+        self._clock, self._key = clock, key
+        self._said: OrderedDict[int, int] = OrderedDict()
+        """Stamps of sent frames by their hashes, the latest at the end."""
+        self._floor = (clock.now() - EPOCH) // UNIT
+        """Stamp up to which signed frames may be recordings."""
         self._first: int | None = None
         self._last: int | None = None
 
@@ -44,19 +56,29 @@ class DuplicateIds:
         for frame in leading_frames(data)[0]:
             mark = hash(frame.data)
             # If an identical frame is sent again, its age counts from the last time.
-            self._said[mark] = None
+            self._said[mark] = _stamp(frame.data) if self._key is not None and frame.signed else 0
             self._said.move_to_end(mark)
             if len(self._said) > REMEMBERED:
-                self._said.popitem(last=False)
+                self._floor = max(self._floor, self._said.popitem(last=False)[1])
 
     def received(self, header: Header, frame: bytes) -> None:
         """Check a received frame."""
         if (header.system, header.component) != self._own or hash(frame) in self._said:
             return
+        if self._key is not None and not self._credible(frame, self._key):
+            return
         now = self._clock.now()
         if self._first is None or self._last is None or now - self._last > _MAX_SILENCE_US:
             self._first = now
         self._last = now
+
+    def _credible(self, frame: bytes, key: Key) -> bool:
+        """Return whether ``frame`` is signed with ``key`` and is no recording."""
+        if frame[0] != mavlink.PROTOCOL_MARKER_V2 or not frame[2] & mavlink.MAVLINK_IFLAG_SIGNED:
+            return False
+        if _stamp(frame) <= self._floor:
+            return False
+        return hmac.compare_digest(key.signature(frame[:-6]), frame[-6:])
 
     @property
     def seen(self) -> bool:
@@ -65,3 +87,8 @@ class DuplicateIds:
         if first is None or last is None:
             return False
         return last - first >= _MIN_SPAN_US and self._clock.now() - last <= _MAX_SILENCE_US
+
+
+def _stamp(frame: bytes) -> int:
+    """Return the time stamp of a signed ``frame``, in 10 µs since 2015."""
+    return int.from_bytes(frame[-12:-6], "little")
