@@ -35,7 +35,7 @@ def agreements(companion: Companion) -> Agreements:
 @pytest.mark.parametrize(
     "fault", [{"kind": "freeze", "for_s": 3.0}, {"kind": "vanish"}], ids=["hangs", "ends"]
 )
-@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+@pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.slow)])
 def test_a_plan_is_kept_whose_companion_is_silent(
     fault: dict[str, Any], flavour: str, tmp_path: Path
 ) -> None:
@@ -62,7 +62,7 @@ def test_a_plan_is_kept_whose_companion_is_silent(
     assert flown.summary["others_converge_s"] is not None
 
 
-@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+@pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.slow)])
 def test_a_companion_that_restarts_in_the_air_begins_where_the_plan_before_ends(
     flavour: str, tmp_path: Path
 ) -> None:
@@ -87,7 +87,7 @@ def test_a_companion_that_restarts_in_the_air_begins_where_the_plan_before_ends(
     assert judge(evidence).certified
 
 
-@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+@pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.slow)])
 def test_in_a_sound_flight_it_never_speaks(flavour: str, tmp_path: Path) -> None:
     """From the ground to the ground: nor while its companion lands."""
     of = scenario("antipodal-8", {**SWAP, "vehicles": 2, "airborne": False, "flavour": flavour})

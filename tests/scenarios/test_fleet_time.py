@@ -110,10 +110,12 @@ def fly(directory: Path, *changes: dict[str, Any], reference: int | None = None)
     [
         {},
         {"faults": [*MINUTES, *DRIFT]},
-        {"faults": [BLIND]},
+        pytest.param({"faults": [BLIND]}, marks=pytest.mark.slow),
         {"faults": [*MINUTES, BLIND, {**BLIND, "vehicle": 13}]},
-        {"faults": [UTC_STEP]},
-        {"faults": [*MINUTES, CLOCK_STEP], **DISCIPLINED, **NO_AUTOPILOT},
+        pytest.param({"faults": [UTC_STEP]}, marks=pytest.mark.slow),
+        pytest.param(
+            {"faults": [*MINUTES, CLOCK_STEP], **DISCIPLINED, **NO_AUTOPILOT}, marks=pytest.mark.slow
+        ),
     ],
     ids=[
         "sound clocks",

@@ -43,6 +43,7 @@ def all_are(near: bool) -> Callable[..., np.ndarray]:
     return lambda _self, _places, states, _ages: np.full(len(states), near)
 
 
+@pytest.mark.slow
 def test_who_hears_all_flies_the_same_flight(monkeypatch: pytest.MonkeyPatch) -> None:
     one = flown()
     monkeypatch.setattr(Neighbours, "ignores", lambda *_: False)

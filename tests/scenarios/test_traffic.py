@@ -18,7 +18,7 @@ from tests.scenarios.lockstep_flights import fly, scenario
     [
         {"neighbour_prediction": "held"},
         {"neighbour_prediction": "velocity"},
-        {"avoidance": "certified", "turning_sense": "right"},
+        pytest.param({"avoidance": "certified", "turning_sense": "right"}, marks=pytest.mark.slow),
     ],
     ids=["held", "velocity", "certified"],
 )

@@ -45,6 +45,7 @@ from tests.mavlink_bridge.recorded_logs import PIECES
 
 AUTOPILOT, COMPANION, NEIGHBOUR = Source(11, 1), Source(11, 195), Source(12, 195)
 TARGET, GROUND = Source(1, 1), Source(255, 190)
+CAMERA = Source(11, 100)
 LATITUDE, LONGITUDE, ALTITUDE = 47.397742, 8.545594, 488.0
 NOW = 1_767_225_600_000_000
 ZERO = (0.0, 0.0, 0.0)
@@ -170,7 +171,15 @@ def messages(checksum: int = 0, now: int = NOW) -> tuple[Known, ...]:
         Known("autopilot", ExtendedSysState(AUTOPILOT, 0, 2)),
         Known("autopilot", StatusText(AUTOPILOT, 4, "Arming refused: no position yet")),
         Known("autopilot", m.NamedValue(COMPANION, boot, "plan_ms", 3.5)),
-        Known("autopilot", m.CameraTrackingGeo(Source(11, 100), 1, *place, (0.0, 1.0, 0.0))),
+        Known("autopilot", m.CameraTrackingGeo(CAMERA, 1, *place, (0.0, 1.0, 0.0))),
+        Known("autopilot", m.CameraTrackingGeo(CAMERA, 1, *place, None, 0.7, 0.4, None, 9.0, 1.5, 0.01)),
+        Known(
+            "autopilot",
+            m.CameraInformation(CAMERA, boot, "outrider", "any", 1, 4.0, (5.6, 3.15), (1280, 720), 0),
+        ),
+        Known("autopilot", m.CameraFovStatus(CAMERA, boot, place, None, (1.0, 0.0, 0.0, 0.0), 1.2, 0.8)),
+        Known("autopilot", m.CameraTrackingImage(CAMERA, 1, 2, 4, None, None, (0.4, 0.3, 0.45, 0.6))),
+        Known("autopilot", m.GimbalAttitude(Source(11, 154), boot, 44, (0.9, 0.0, -0.4, 0.0), None)),
         Known("autopilot", scan(boot)),
         Known(
             "swarm", m.AdsbVehicle(Source(11, 156), 0x4B1234, *place, True, 1.0, 60.0, 0.0, "HB", 1, 10**6)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -79,6 +80,7 @@ def loop_of(numbers: tuple[float, float, float], lag_us: int) -> Loop:
     return Loop(position, velocity, 1.0, shaping, inverse=Inverse(integral, lag_us))
 
 
+@pytest.mark.slow
 @given(seeds, gains, drags)
 def test_a_vehicle_with_known_drag_and_without_lag_is_on_its_plan(
     seed: int, numbers: tuple[float, float, float], drag: float
@@ -90,6 +92,7 @@ def test_a_vehicle_with_known_drag_and_without_lag_is_on_its_plan(
     assert followed(loop, drag, plan, helped=True) <= 0.01 + 0.05 * without
 
 
+@pytest.mark.slow
 @given(seeds, gains, st.floats(0.1, 0.5))
 def test_a_lag_of_the_attitude_costs_a_fraction_of_what_it_did(
     seed: int, numbers: tuple[float, float, float], drag: float

@@ -50,6 +50,7 @@ def test_the_page_shows_all_and_says_what_became_of_each(here: Path) -> None:
     assert (here / "runs" / "sweep-gallery" / "journal.jsonl").is_file()
 
 
+@pytest.mark.slow
 def test_what_is_flown_already_is_not_flown_again(here: Path) -> None:
     assert gallery(("obstacles",), out=Path("out"), run="tests.outrider.gallery.runs:fine") == 0
     before = Path("out/journal.jsonl").read_bytes()
@@ -57,6 +58,7 @@ def test_what_is_flown_already_is_not_flown_again(here: Path) -> None:
     assert Path("out/journal.jsonl").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_few_may_be_flown_before_the_rest(here: Path) -> None:
     assert gallery(("obstacles",), out=Path("out"), run="tests.outrider.gallery.runs:fine") == 0
     assert gallery(("traffic", "obstacles"), out=Path("out"), run="tests.outrider.gallery.runs:fine") == 0

@@ -76,6 +76,7 @@ def test_without_a_violation_being_stuck_is_a_result(here: Path, capsys: pytest.
     assert "out" in said.err
 
 
+@pytest.mark.slow
 def test_what_was_flown_is_not_flown_again(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     paper(2, out=Path("out"), rows=THREE, run="tests.outrider.paper.runs:fine")
     before = Path("out/journal.jsonl").read_bytes()

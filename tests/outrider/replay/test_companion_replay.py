@@ -24,6 +24,8 @@ from tests.outrider.said import Run
 from tests.outrider.shipped import FIREFLY, scenario
 
 SHORT: dict[str, Any] = {"cap_s": 2.0, "airborne": True}
+FAST = {"antipodal-8", "escort"}
+"""Scenarios that are also flown by `make test`."""
 SCENARIOS = sorted(path.stem for path in (config_root() / "scenarios").glob("*.yaml"))
 WAYS: dict[str, dict[str, Any]] = {
     **{method: {"methods": [method]} for method in METHODS},
@@ -45,13 +47,17 @@ def short(name: str, **companion: Any) -> Scenario:
     return scenario(name, **changes)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize(
+    "name",
+    [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in SCENARIOS],
+)
 def test_every_scenario_is_the_same_again(name: str, tmp_path: Path) -> None:
     for one in again(flown(short(name), tmp_path / "run")):
         assert one.identical, one
         assert one.setpoints > 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_so_is_every_method(way: str, tmp_path: Path) -> None:
     for one in again(flown(short("scenario-2", **WAYS[way]), tmp_path / "run")):

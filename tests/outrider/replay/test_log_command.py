@@ -87,6 +87,7 @@ def test_the_same_log_gives_the_same_set_points(log: Path) -> None:
     continuous(once.would, config)
 
 
+@pytest.mark.slow
 def test_what_a_log_lacks_is_put_in(log: Path, tmp_path: Path) -> None:
     """Without GPS_GLOBAL_ORIGIN, or without LOCAL_POSITION_NED, nearly the same is said."""
     config, cast = CompanionConfig(), Roles(11)
@@ -104,6 +105,7 @@ def test_what_a_log_lacks_is_put_in(log: Path, tmp_path: Path) -> None:
         assert len(found.would) > 0.5 * len(whole.would)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "own"), REAL)
 def test_logs_of_real_autopilots_give_sound_set_points(name: str, own: int) -> None:
     path = SHARED / f"{name}.tlog"

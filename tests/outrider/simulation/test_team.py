@@ -87,6 +87,7 @@ class Meddler:
             flight.change(now, Change("baseline", 0.5, (3.0, 0.0, 5.0)))
 
 
+@pytest.mark.slow
 def test_what_a_viewer_sees_and_changes_is_the_same(tmp_path: Path) -> None:
     of = scenario("antipodal-8", **SHORT)
     views, logs = [], []

@@ -176,6 +176,7 @@ def test_another_gain_fails_the_golden_test_in_words(pytester: pytest.Pytester) 
     assert re.search(r"\d+ of \d+ differ, most \d+\.\d\d s after", said)
 
 
+@pytest.mark.slow
 def test_the_example_in_the_docs_works(pytester: pytest.Pytester) -> None:
     """As it stands there, with a log to listen to."""
     text = EXAMPLE.read_text(encoding="utf-8")
