@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mavlink_bridge.messages import GlobalPosition, Tunnel
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import CameraTrackingGeo, GlobalPosition, Tunnel
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.realtime.flight import RealTimeFlight
@@ -51,6 +52,26 @@ COMES: dict[str, Any] = {
 }
 
 
+SEES = {
+    "mount": {"kind": "gimbal", "pitch_deg": 60.0},
+    "pixel_sigma": 0.0,
+    "object": {"height": 0.3, "height_sigma": 0.0},
+}
+
+
+def detected(log: Path, by: int, frame: FleetFrame) -> np.ndarray:
+    """The places (n, 3) that the camera of system ``by`` detected."""
+    codec = Codec(lambda _identifier, *source: source == (by, 100))
+    found = [message for record in read_tlog(log) for message in codec.feed(record.frame)]
+    return np.array(
+        [
+            frame.to_enu(one.latitude, one.longitude, one.altitude)
+            for one in found
+            if isinstance(one, CameraTrackingGeo)
+        ]
+    )
+
+
 def said(log: Path, by: int) -> set[type]:
     """The messages of system ``by`` in a log."""
     codec = Codec(lambda _identifier, system, _component: system == by)
@@ -59,7 +80,9 @@ def said(log: Path, by: int) -> set[type]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "changes", [{}, {**HANGS, **CUT, "moving": [COMES]}], ids=["calm", "frozen, cut off, and a post"]
+    "changes",
+    [{}, {**HANGS, **CUT, "moving": [COMES], "camera": SEES}],
+    ids=["calm", "frozen, cut off, and a post"],
 )
 def test_a_flight_in_real_time(changes: dict[str, Any], tmp_path: Path) -> None:
     of = scenario("antipodal-8", SMALL, changes)
@@ -92,6 +115,11 @@ def test_a_flight_in_real_time(changes: dict[str, Any], tmp_path: Path) -> None:
         log = tmp_path / f"vehicle-{system}.tlog"
         assert read_tlog(log).report.skipped_bytes == 0
         assert len(setpoints(log)) > 20
+        if of.camera is not None:
+            # The target stands; what hides it at times does not move it.
+            places = detected(log, system, flight.fleet.frame)
+            assert len(places) > 5
+            assert np.abs(places - flight.fleet.target().position(0)).max() < 0.05
 
 
 @pytest.mark.slow

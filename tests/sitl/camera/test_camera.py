@@ -298,6 +298,13 @@ def test_a_camera_stops_and_changes_its_rate_on_command() -> None:
     before = len(bench.all(CameraFovStatus))
     bench.run(2.0)
     assert len(bench.all(CameraFovStatus)) - before == 10
+    bench.order(511, 276, 3e38)
+    (interval,) = (m for m in bench.order(510, 276) if isinstance(m, MessageInterval) and m.interval > 10**6)
+    assert interval.interval == 2**31 - 1
+    assert [m.result for m in bench.order(511, 276, 5.0) if isinstance(m, CommandAck)] == [
+        mavlink.MAV_RESULT_DENIED
+    ]
+    bench.order(511, 276, 0)
     bench.order(2010)
     bench.run(0.3)
     quiet = len(bench.all(CameraFovStatus))

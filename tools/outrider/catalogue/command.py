@@ -90,5 +90,6 @@ def _next(kind: str, path: Path) -> str:
         "sweep": f"fly it with: outrider sweep {shown}",
         "scene": "name it in a sweep",
         "vehicle": f"name it in a scenario, or fly it with: outrider sitl --vehicle {shown}",
+        "camera": f"use it with: outrider sitl --camera {shown}",
         "companion": f"fly it with: outrider fly --config {shown} …",
     }[kind]

@@ -12,7 +12,7 @@ from outrider.resources import config_root
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION
 
-KINDS: Final = ("scenarios", "sweeps", "scenes", "vehicles", "companions")
+KINDS: Final = ("scenarios", "sweeps", "scenes", "vehicles", "cameras", "companions")
 """Kinds of shipped files: the folders of the configuration."""
 RUNS: Final = "runs"
 _LONGEST: Final = 400

@@ -13,7 +13,9 @@ from outrider.commands.options import AsJson
 def listing(
     kind: Annotated[
         str | None,
-        typer.Argument(help="scenarios, sweeps, scenes, vehicles, companions or runs; by default all."),
+        typer.Argument(
+            help="scenarios, sweeps, scenes, vehicles, cameras, companions or runs; by default all."
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -26,7 +28,9 @@ def listing(
 def new(
     path: Annotated[Path, typer.Argument(help="The new file, such as my.yaml.")],
     like: Annotated[str, typer.Option(help="What is copied: a shipped name, or a file.")] = "escort",
-    kind: Annotated[str, typer.Option(help="scenario, sweep, scene, vehicle or companion.")] = "scenario",
+    kind: Annotated[
+        str, typer.Option(help="scenario, sweep, scene, vehicle, camera or companion.")
+    ] = "scenario",
 ) -> None:
     """Copy a scenario with its comments to a new file, to be edited. Editors find its schema."""
     from outrider.catalogue.command import create

@@ -155,7 +155,11 @@ def sitl(
     ] = None,
     signing_key: SigningKey = None,
     camera: Annotated[
-        str | None, typer.Option(help="Cameras of the vehicles and what they see: a file, or walker.")
+        str | None,
+        typer.Option(
+            help="Cameras of the vehicles and what they see: a file, or walker.",
+            autocompletion=shipped("cameras"),
+        ),
     ] = None,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so many s.")] = None,
     as_json: Annotated[
