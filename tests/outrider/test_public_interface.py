@@ -43,6 +43,24 @@ def test_types_are_shipped() -> None:
         assert files(package).joinpath("py.typed").is_file()
 
 
+@pytest.mark.slow
+def test_planner_physics_and_flights_need_nothing_that_only_posix_has() -> None:
+    """As on Windows: no fcntl, no fork. docs/platforms.md says so."""
+    code = """
+import os, sys
+for name in ("fcntl", "pwd", "grp", "termios", "resource", "tty", "pty"):
+    sys.modules[name] = None
+del os.fork
+import outrider
+import outrider.__main__
+assert outrider.Planner().step(0.0, (0, 0, 5), (0, 0, 0), goal=(3, 0, 5)).plan
+outrider.sim.Batch().step([[0, 0, 6]])
+short = {"airborne": True, "cap_s": 0.2, "companion": {"rates": {"replan_us": 100_000}}}
+outrider.fly("antipodal-8", vehicles=2, **short).to_html()
+"""
+    subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+
+
 def test_an_import_loads_nothing_heavy() -> None:
     """The command line imports the package too: it must not get slower."""
     heavy = "('numpy', 'numba', 'pydantic', 'typer')"

@@ -1,4 +1,4 @@
-"""What README shows can be done: its piece of a scenario is one, its commands exist."""
+"""What docs/flying-scenarios.md shows can be done: its pieces of a scenario are some."""
 
 from __future__ import annotations
 
@@ -6,30 +6,28 @@ import re
 from pathlib import Path
 
 import yaml
-from typer.main import get_command
 
 from companion.config import CompanionConfig
-from outrider.__main__ import app
 from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
 from outrider.yaml_files.yaml_file import load, read
 
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "flying-scenarios.md").read_text(encoding="utf-8")
 
 
 def shown(name: str, number: int) -> Scenario:
     """A shipped scenario with what a block of YAML shows."""
-    block = re.findall(r"```yaml\n(.*?)```", README, re.DOTALL)[number]
+    block = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)[number]
     base = load(find("scenarios", name), Scenario).model_dump(mode="json")
     text = yaml.safe_dump({**base, **yaml.safe_load(block)}, allow_unicode=True)
-    return read(text.encode(), "README.md", Scenario)
+    return read(text.encode(), "flying-scenarios.md", Scenario)
 
 
 def test_its_surfaces_are_some() -> None:
     found = shown("scenario-1", 0)
     assert found.companion.surface_of(12).height == 8.0
     assert found.size == found.vehicles + 2
-    for other in re.findall(r"(\{kind: (?:sphere|cylinder|ellipsoid), (?:radius|semi).*?\})", README):
+    for other in re.findall(r"(\{kind: (?:sphere|cylinder|ellipsoid), (?:radius|semi).*?\})", PAGE):
         CompanionConfig.model_validate({"surface": yaml.safe_load(other)})
 
 
@@ -45,14 +43,3 @@ def test_its_rough_world_is_one() -> None:
     found = shown("antipodal-8", 2)
     assert found.faults
     assert found.weather.wind == (6.0, 0.0, 0.0)
-
-
-def test_its_commands_and_options_exist() -> None:
-    commands = get_command(app).commands  # type: ignore[attr-defined]
-    lines = re.findall(r"outrider (\w+) ([^`\n#]*)", README)
-    assert len(lines) >= 5
-    for name, rest in lines:
-        if name in commands:
-            options = {option for parameter in commands[name].params for option in parameter.opts}
-            assert set(re.findall(r"--[a-z-]+", rest)) <= options
-    assert {name for name, _ in lines} & set(commands) >= {"swarm", "sweep"}

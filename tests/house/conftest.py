@@ -1,0 +1,7 @@
+"""The command line, for the tests of documents."""
+
+from __future__ import annotations
+
+from tests.outrider.conftest import run
+
+__all__ = ["run"]
