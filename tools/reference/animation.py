@@ -97,8 +97,8 @@ def _frame(flight: Flight, time: float) -> Image.Image:
         family="monospace",
     )
     canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
     return Image.fromarray(pixels[..., :3].copy())
 
 
