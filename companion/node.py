@@ -255,5 +255,5 @@ class Companion:
         for link, messages in links.items():
             if messages:
                 codec = self._codecs[link]
-                out.append(Datagram(link, b"".join(codec.encode(message) for message in messages)))
+                out.append(Datagram(link, b"".join([codec.encode(message) for message in messages])))
         return out

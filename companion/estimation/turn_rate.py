@@ -28,7 +28,7 @@ class Turn(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Positions (n, 3) m and velocities (n, 3) m/s, fleet-local ENU; ``velocities`` may be read-only."""
+    """Positions (n, 3) m and velocities (n, 3) m/s, fleet-local ENU."""
 
     positions: Array
     velocities: Array
@@ -70,7 +70,9 @@ def turning_path(position: Array, velocity: Array, rate: float, seconds: Array) 
     """
     if rate == 0.0:
         straight = position + np.multiply.outer(seconds, velocity)
-        return Path(straight, np.broadcast_to(velocity, straight.shape))
+        velocities = np.empty(straight.shape)
+        velocities[:] = velocity
+        return Path(straight, velocities)
     angle = rate * seconds
     # sin(ωt)/ω and (1 − cos(ωt))/ω, in a form that is exact also where ω is nearly 0.
     along = seconds * np.sinc(angle / np.pi)

@@ -47,6 +47,8 @@ class Planning:
         self.fastest: Array = np.array(config.limits.v_max)
         """v_max (3,), m/s, as lowered by the autopilot's parameters."""
         self._stepped = 0
+        # Times (s) of the steps of a plan, n = 1…N + 1.
+        self._ahead: Array = 1e-6 * config.horizon.dt_us * np.arange(1.0, config.horizon.steps + 2.0)
 
     def yaw(self, time: int) -> Yaw:
         """Return the planned yaw at ``time`` (µs)."""
@@ -102,8 +104,7 @@ class Planning:
         """
         if view.target is None:
             return
-        ahead: Array = 1e-6 * self._config.horizon.dt_us * np.arange(1.0, len(places) + 1.0)
-        self._heading.plan(now, places, view.target.ahead(ahead).positions)
+        self._heading.plan(now, places, view.target.ahead(self._ahead).positions)
 
     def _aim(self, now: int, view: View, measured: Motion, *, cautious: bool) -> Aim | None:
         """Return the aim of the next plan; None if the function of a user's surface fails."""

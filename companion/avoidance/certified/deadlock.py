@@ -133,6 +133,7 @@ class DeadlockTurn:
         """
         aside = turned(direction, -self._sense * 0.5 * np.pi)
         velocities = pushes.velocities / self._config.chase
-        crossing = np.clip(velocities @ aside, 0.0, 1.0) * np.clip(velocities @ direction, 0.0, 1.0)
-        result: Array = (1.0 - crossing) @ pushes.forces
+        # np.clip costs four times as much for arrays as small as these.
+        beside, ahead = (np.minimum(np.maximum(velocities @ way, 0.0), 1.0) for way in (aside, direction))
+        result: Array = (1.0 - beside * ahead) @ pushes.forces
         return result
