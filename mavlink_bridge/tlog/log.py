@@ -5,7 +5,8 @@ wire.
 
 Logs of real flights may be damaged. The reader accepts a frame if its checksum is correct. It steps over a
 damaged record by the length in its header if a plausible record follows there; otherwise it searches for the
-next valid frame. It reads undamaged records many at a time (``stretch``).
+next valid frame. A stamp of 2⁶³ µs and more is damage: its frame gets the time of the record before. It
+reads undamaged records many at a time (``stretch``).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from typing import NamedTuple, Self
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.tlog.stretch import Record, Stretch, leading_records
+from mavlink_bridge.tlog.stretch import IMPOSSIBLE, Record, Stretch, leading_records
 from mavlink_bridge.wire.framing import (
     LONGEST_FRAME,
     MAX_CACHED_BYTES,
@@ -318,6 +319,8 @@ class _Pass:
 
     def _plausible(self, at: int, reference: int | None) -> bool:
         (stamp,) = _STAMP.unpack_from(self._window, at)
+        if stamp >= IMPOSSIBLE:
+            return False
         return reference is None or bool(abs(stamp - reference) <= PLAUSIBLE_JUMP)
 
     def _step_over(self, *, unknown_message: bool) -> bool:

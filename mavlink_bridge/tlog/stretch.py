@@ -17,6 +17,8 @@ from mavlink_bridge.wire.framing import CRC_EXTRA
 SHORTEST_RECORD = 16
 """Bytes: a stamp and a version 1 frame without payload."""
 
+IMPOSSIBLE = 1 << 63
+"""µs: stamps from here on, 292 000 years after 1970, are damage. Times are signed numbers of 64 bits."""
 _HEAD = Struct(">QBB")
 _EXTRA_V1 = tuple(CRC_EXTRA.get(number) for number in range(256))
 _EXTRA_V2 = {number.to_bytes(3, "little"): extra for number, extra in CRC_EXTRA.items() if number < 1 << 24}
@@ -45,7 +47,8 @@ class Stretch(NamedTuple):
 def leading_records(data: bytes, start: int, before: int) -> Stretch:
     """Return the records of ``data`` from ``start`` on, up to the first irregular one.
 
-    A record is irregular if it is damaged, cut off, or of a message that the dialect lacks. ``before``: time
+    A record is irregular if it is damaged, cut off, of a message that the dialect lacks, or has an
+    ``IMPOSSIBLE`` time. ``before``: time
     (µs) of the previous record, 0 if there is none.
     """
     records: list[Record] = []
@@ -71,6 +74,7 @@ def leading_records(data: bytes, start: int, before: int) -> Stretch:
             break
         if (
             extra is None
+            or stamp >= IMPOSSIBLE
             or stop > len(data)
             or checksum(data[at + 9 : end] + extra) != data[end] | data[end + 1] << 8
         ):

@@ -296,3 +296,24 @@ def test_no_log_of_ours_holds_a_signature_or_a_key() -> None:
     assert all(data[2] == 0 for data in found)
     received = [dialect.MAVLink(None).decode(bytearray(data)) for data in found]
     assert [message.custom_mode for message in received] == [0, 1, 7, 2]
+
+
+@given(impossible=st.sets(st.integers(0, 29), max_size=30), stamp=st.integers(1 << 63, (1 << 64) - 1))
+def test_a_time_beyond_all_reason_is_damage_and_its_frame_is_kept(impossible, stamp):
+    """Records of such a time have that of the record before them, 0 at the beginning."""
+    codec = Codec()
+    frames = [codec.encode(Heartbeat(Source(1, 1), 2, 3, 0, k, 4)) for k in range(30)]
+    times = [4 * (1 << 40) + 4 * k for k in range(30)]
+    stamps = [stamp if k in impossible else times[k] for k in range(30)]
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "flight.tlog"
+        path.write_bytes(b"".join(s.to_bytes(8, "big") + f for s, f in zip(stamps, frames, strict=True)))
+        log = read_tlog(path)
+        records = list(log)
+    assert [record.frame for record in records] == frames
+    expected, last = [], 0
+    for k, time in enumerate(times):
+        last = last if k in impossible else time
+        expected.append(last)
+    assert [record.time for record in records] == expected
+    assert log.report.bad == len(impossible)
