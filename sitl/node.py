@@ -35,6 +35,7 @@ from sitl.autopilot.firmware.ardupilot import ArduPilot
 from sitl.autopilot.firmware.px4 import Px4
 from sitl.autopilot.flight_control import FlightControl
 from sitl.autopilot.home_commands import HomeCommands
+from sitl.autopilot.missions.items import Item
 from sitl.autopilot.missions.service import MissionService
 from sitl.autopilot.navigation import Navigation
 from sitl.autopilot.own_clock import OwnClock
@@ -153,6 +154,8 @@ class Autopilot:
             self._outbox,
             reporter,
             asks_int=self._firmware.bytewise,
+            home=None if self._firmware.bytewise else self._home_item,
+            guided=None if self._firmware.bytewise else control.maneuvers.go,
         )
         self._services = Services(
             source,
@@ -337,6 +340,13 @@ class Autopilot:
         except EncodeError:
             self.not_encoded += 1
             return b""
+
+    def _home_item(self) -> Item:
+        """Return ArduPilot's item 0: home."""
+        home = self._navigation.home
+        x, y = round(home.latitude * 1e7), round(home.longitude * 1e7)
+        waypoint, frame = mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL
+        return Item(frame, waypoint, 1, (0.0, 0.0, 0.0, 0.0), x, y, home.altitude)
 
     def _configure(self) -> None:
         """Apply the parameters that are settings.

@@ -116,7 +116,7 @@ class TlogWriter:
 
     def write_all(self, time_us: int, datagrams: Iterable[tuple[int, bytes]]) -> None:
         """Write the records of several datagrams of one time, each with its link, as ``write`` does."""
-        if not 0 <= time_us < 1 << 64:
+        if not 0 <= time_us < IMPOSSIBLE:
             raise LogError(f"time {time_us} µs: not in a tlog's range")
         stamps = [_STAMP.pack(time_us & ~3 | link) for link in range(LINKS)]
         records = []

@@ -13,9 +13,10 @@ from sitl.autopilot.commander import Commander
 from sitl.autopilot.firmware import CommandRefusal, Firmware, Mode
 from sitl.autopilot.following import Following
 from sitl.autopilot.guidance import Activity, Guidance
+from sitl.autopilot.missions.items import Item
 from sitl.autopilot.missions.itinerary import Itinerary
 from sitl.estimation.sensors import Estimate
-from sitl.values.home import Home
+from sitl.values.home import ABOVE_HOME, ABOVE_SEA, Home
 from sitl.values.origin import Origin
 
 # An air speed is treated as a ground speed, because the speed limits of the guidance ignore the wind.
@@ -172,6 +173,17 @@ class Maneuvers:
             here = self._estimate().pose
             self._guidance.go(target, self._leg_speed(order.params[0]), self._yaw(order.params[3]), here)
         return None
+
+    def go(self, item: Item, now: int) -> bool:
+        """Fly to the place of a mission item, as ArduCopter does in GUIDED; return whether it does.
+
+        This is how scripts flew before DO_REPOSITION (DroneKit's ``simple_goto``).
+        """
+        relative = True if item.frame in ABOVE_HOME else False if item.frame in ABOVE_SEA else None
+        if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or relative is None:
+            return False
+        place = (-1.0, 0.0, 0.0, math.nan, float(item.x), float(item.y), item.z)
+        return self._reposition(Order(place, relative, now, integer=True)) is None
 
     def _target(self, order: Order) -> tuple[float, float, float] | CommandRefusal:
         """Return the target (m, local NED) or the refusal. PX4 takes a NaN coordinate as "unchanged"."""

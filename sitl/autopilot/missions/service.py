@@ -27,7 +27,7 @@ from mavlink_bridge.messages import (
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.firmware import CommandRefusal, Mode
-from sitl.autopilot.missions.items import Type
+from sitl.autopilot.missions.items import Item, Type
 from sitl.autopilot.missions.itinerary import Itinerary, Phase
 from sitl.autopilot.missions.plans import Plans
 from sitl.autopilot.missions.transfer import Transfer
@@ -52,7 +52,10 @@ class MissionService:
         status_text: StatusReporter,
         *,
         asks_int: bool,
+        home: Callable[[], Item] | None = None,
+        guided: Callable[[Item, int], bool] | None = None,
     ) -> None:
+        """Set the partners; ``home`` and ``guided`` as in ``Transfer``."""
         self._source = source
         self._plans = plans
         self._itinerary = itinerary
@@ -60,7 +63,9 @@ class MissionService:
         self._telemetry = telemetry
         self._outbox = outbox
         self._status_text = status_text
-        self.transfer = Transfer(source, plans, outbox, status_text, asks_int=asks_int)
+        self.transfer = Transfer(
+            source, plans, outbox, status_text, asks_int=asks_int, home=home, guided=guided
+        )
         plans.changed = itinerary.replaced
         transfer = self.transfer
         self.handlers: dict[type[Any], Callable[[Any, int], None]] = {

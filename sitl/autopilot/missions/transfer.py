@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -35,6 +36,8 @@ CAPACITY: Final = 724
 # Time after which a missing item is requested again (µs), and the limit of requests.
 _RETRY_US, _MAX_TRIES = 500_000, 10
 _NEVER: Final = 1 << 62
+_GUIDED, _ALTITUDE = 2, 3
+"""Values of ``current`` of ArduPilot's items that are no items of a plan."""
 _KNOWN: Final = frozenset(int(of) for of in Type)
 
 
@@ -57,6 +60,10 @@ class Transfer:
     A plan takes effect when its last item has arrived and all are valid; an aborted upload leaves the old
     plan. ``next_due`` (µs): no ``work`` is due before it. ArduPilot requests items with MISSION_REQUEST (40),
     PX4 with MISSION_REQUEST_INT (51); MISSION_ITEM_INT (73) or MISSION_ITEM (39) answers either request.
+
+    ArduPilot's item 0 is home: it is sent as home whatever was uploaded, even where there is no mission.
+    An item with ``current`` 2 is no item of a plan but a place to fly to in GUIDED; ``current`` 3 has no
+    effect on an ArduCopter, and is accepted.
     """
 
     def __init__(
@@ -67,7 +74,15 @@ class Transfer:
         status_text: StatusReporter,
         *,
         asks_int: bool,
+        home: Callable[[], Item] | None = None,
+        guided: Callable[[Item, int], bool] | None = None,
     ) -> None:
+        """Set the partners.
+
+        ``home`` returns item 0 of a mission, None where it is an item like others. ``guided`` flies to a
+        place at a time (µs) and returns whether it does; None where the firmware has no such items.
+        """
+        self._home, self._guided = home, guided
         self._source = source
         self._plans = plans
         self._outbox = outbox
@@ -103,6 +118,13 @@ class Transfer:
 
     def item(self, message: MissionItem | MissionItemFloat, now: int) -> None:
         """Handle MISSION_ITEM_INT (73) or MISSION_ITEM (39): the requested item or a repeated one."""
+        if self._guided is not None and message.current in (_GUIDED, _ALTITUDE):
+            item, flies = _integer(message), message.current == _ALTITUDE
+            if item is not None and not flies:
+                flies = self._guided(item, now)
+            result = mavlink.MAV_MISSION_ACCEPTED if flies else mavlink.MAV_MISSION_ERROR
+            self._acknowledge(message.source, Type.MISSION, result)
+            return
         upload = self._upload
         if upload is None or (message.source, message.mission_type) != (upload.partner, upload.of):
             self._acknowledge(message.source, message.mission_type, mavlink.MAV_MISSION_DENIED)
@@ -166,6 +188,8 @@ class Transfer:
         if of is None:
             return
         items = self._plans.items(of)
+        if of is Type.MISSION and message.seq == 0 and self._home is not None:
+            items = (self._home(), *items[1:])
         if message.seq >= len(items):
             self._acknowledge(message.source, of, mavlink.MAV_MISSION_INVALID_SEQUENCE)
             return

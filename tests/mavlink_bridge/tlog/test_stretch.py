@@ -24,6 +24,8 @@ def one_by_one(data: bytes, at: int) -> tuple[list[Record], int]:
     found = []
     while not isinstance(frame := frame_at(data, at + 8), Flaw) and frame.known:
         stamp = int.from_bytes(data[at : at + 8], "big")
+        if stamp >= 1 << 63:
+            break
         found.append(Record(stamp & ~3, stamp & 3, frame.data))
         at += 8 + len(frame.data)
     return found, at
@@ -33,7 +35,7 @@ def one_by_one(data: bytes, at: int) -> tuple[list[Record], int]:
     st.sampled_from(LOGS),
     st.floats(0.0, 1.0, exclude_max=True),
     st.lists(st.tuples(st.integers(0, 2000), st.integers(1, 255)), max_size=3),
-    st.integers(0, 2**63),
+    st.integers(0, 2**63 - 1),
     st.integers(0, 4000),
 )
 def test_it_is_what_one_finds_frame_by_frame(

@@ -98,9 +98,9 @@ def test_the_firmwares_ask_as_they_do():
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_old_messages_do_too(flavour):
     client = Client(Rig(flavour), v1=True)
-    plan = [at(0, 0, 5, TAKEOFF), at(10, 0, 5)]
+    plan = [at(0, 0, 5, TAKEOFF), at(10, 0, 5), at(0, 4, 6)]
     assert upload(client, plan, make=old_item) == ACCEPTED
-    for seq, way in enumerate(plan):
+    for seq, way in [*enumerate(plan)][1:]:
         found = client.send(dialect.MAVLink_mission_request_message(11, 1, seq))
         message = only(found, "MISSION_ITEM")
         # A latitude in float32 is off by up to 2e-6 degrees, on either way.
@@ -144,7 +144,7 @@ def test_too_many_and_unknown_types_are_refused():
     assert acks(client.send(count(10_000))) == [NO_SPACE]
     assert acks(client.send(count(1, 7))) == [UNSUPPORTED]
     assert acks(client.send(dialect.MAVLink_mission_request_list_message(11, 1, 9))) == [UNSUPPORTED]
-    assert acks(client.send(dialect.MAVLink_mission_request_int_message(11, 1, 0, 0))) == [BAD_SEQUENCE]
+    assert acks(client.send(dialect.MAVLink_mission_request_int_message(11, 1, 1, 0))) == [BAD_SEQUENCE]
     assert acks(client.send(item(SQUARE[0], 0))) == [DENIED]
     assert acks(client.send(count(0))) == [ACCEPTED]
 
@@ -285,3 +285,50 @@ def test_in_whatever_order_a_plan_is_always_one_that_was_accepted(said, flavour)
         assert repr(again.saved.plans) == repr(client.rig.autopilot.saved.plans)
     assert upload(client, SQUARE) == ACCEPTED
     assert ways(download(client)) == expected(SQUARE)
+
+
+@pytest.mark.parametrize("uploaded", [False, True], ids=["no mission", "a mission"])
+def test_item_0_is_home_on_an_arducopter_and_as_it_was_uploaded_on_a_px4(uploaded):
+    """An ArduCopter's can always be read, also where there is no mission."""
+    for flavour in FLAVOURS:
+        client = Client(Rig(flavour))
+        client.wait(1.2)
+        if uploaded:
+            assert upload(client, SQUARE) == ACCEPTED
+        found = client.send(dialect.MAVLink_mission_request_int_message(11, 1, 0, 0))
+        found += client.send(dialect.MAVLink_mission_request_message(11, 1, 0, 0))
+        items = [m for m in found if m.get_type() in ("MISSION_ITEM_INT", "MISSION_ITEM")]
+        if flavour == "px4":
+            assert [(m.command, m.z) for m in items] == [(TAKEOFF, 5.0)] * 2 * uploaded
+            assert acks(found) == [BAD_SEQUENCE] * (2 - 2 * uploaded)
+            continue
+        assert [(m.command, m.frame, m.z) for m in items] == [(WAYPOINT, 0, SITE.altitude)] * 2
+        assert (items[0].x, items[0].y) == (round(SITE.latitude * 1e7), round(SITE.longitude * 1e7))
+        if uploaded:
+            assert len(download(client)) == len(SQUARE)
+
+
+@pytest.mark.parametrize("make", [item, old_item])
+def test_an_item_that_is_no_item_of_a_plan_flies_an_arducopter_in_guided(make):
+    """``current`` is 2: how DroneKit's ``simple_goto`` flies."""
+    for flavour in FLAVOURS:
+        rig = Rig(flavour, start_height=5.0)
+        client = Client(rig)
+        client.wait(1.2)
+
+        def goto(client: Client = client) -> list[int]:
+            message = make(at(6, -4, 7), 0)
+            message.current = 2
+            return acks(client.send(message))
+
+        if flavour == "px4":
+            assert goto() == [DENIED]
+            continue
+        assert client.command(176, 1, 5) == 0
+        assert goto() == [ERROR]
+        assert client.command(176, 1, 4) == 0
+        assert goto() == [ACCEPTED]
+        client.wait(15.0)
+        north, east, down = rig.autopilot.state.position
+        assert (north, east, -down) == pytest.approx((6.0, -4.0, 7.0), abs=0.4)
+        assert download(client) == []
