@@ -109,8 +109,15 @@ def create_key(path: Path | str) -> Key:
         raise KeyFileError(f"{path}: is there already; a key is not overwritten") from None
     except OSError as error:
         raise KeyFileError(f"{path}: cannot be written: {error.strerror}") from None
-    with open(number, "w", encoding="ascii") as file:
-        file.write(line + "\n")
+    try:
+        with open(number, "w", encoding="ascii") as file:
+            file.write(line + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        # Nothing is left that looks like a key.
+        Path(path).unlink(missing_ok=True)
+        raise KeyFileError(f"{path}: cannot be written: {error.strerror}") from None
     return Key.of_passphrase(line)
 
 

@@ -25,6 +25,8 @@ _VERTICAL: Final = (mavlink.SPEED_TYPE_CLIMB_SPEED, mavlink.SPEED_TYPE_DESCENT_S
 # Values of parameter 2 of DO_CHANGE_SPEED.
 _NO_CHANGE, _DEFAULT_SPEED = -1.0, -2.0
 _MAX_SPEED: Final = 100.0
+_FACED_M: Final = 2.0
+"""m: a nearer place is not faced."""
 _MAX_LATITUDE_LONGITUDE: Final = (90.0, 180.0)
 
 
@@ -171,7 +173,8 @@ class Maneuvers:
                 return refusal
         if commander.armed and not commander.landed:
             here = self._estimate().pose
-            self._guidance.go(target, self._leg_speed(order.params[0]), self._yaw(order.params[3]), here)
+            yaw = self._yaw(order.params[3], target)
+            self._guidance.go(target, self._leg_speed(order.params[0]), yaw, here)
         return None
 
     def go(self, item: Item, now: int) -> bool:
@@ -216,6 +219,13 @@ class Maneuvers:
         mode, speed = self._speed or (None, 0.0)
         return speed if mode is self._commander.mode else self._commander.level_speed
 
-    def _yaw(self, asked: float) -> float | None:
-        """Return PX4's parameter 4 (rad). None, if it is not finite or for ArduPilot, keeps the heading."""
-        return asked if not self._flavour.stops and math.isfinite(asked) else None
+    def _yaw(self, asked: float, target: tuple[float, float, float]) -> float | None:
+        """Return PX4's parameter 4 (rad), or the direction of an ArduCopter's way; None keeps the heading.
+
+        An ArduCopter faces a way-point (WP_YAW_BEHAVIOR 2, its default), unless it is near.
+        """
+        if not self._flavour.stops:
+            return asked if math.isfinite(asked) else None
+        here = self._estimate().position
+        north, east = target[0] - here[0], target[1] - here[1]
+        return math.atan2(east, north) if math.hypot(north, east) > _FACED_M else None

@@ -16,6 +16,7 @@ from sitl.telemetry.streams import members
 
 _LAST_ID: Final = 0xFFFF
 # 36 min: the largest interval that fits into MESSAGE_INTERVAL.
+_SLOWEST_HEARTBEAT_US: Final = 1_000_000
 _MAX_INTERVAL_US: Final = 0x7FFFFFFF
 
 
@@ -72,6 +73,9 @@ class Requests:
             return CommandRefusal(
                 mavlink.MAV_RESULT_FAILED, f"Interval refused: {interval:.0f} us is too short"
             )
+        if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not 0.0 <= interval <= _SLOWEST_HEARTBEAT_US:
+            # All clients hear the same HEARTBEAT, and take the vehicle for lost without it.
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Interval refused: HEARTBEAT stays on")
         wanted = min(round(interval), _MAX_INTERVAL_US)
         if not self._telemetry.set_interval(int(message_id), wanted, order.now):
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Interval refused: no message {message_id:.0f}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from mavlink_bridge.messages import (
     CommandAck,
     CommandInt,
@@ -98,7 +100,9 @@ class Reception:
     def _obey(self, message: CommandLong | CommandInt, now: int) -> None:
         result, reason = self._orders.obey(message, now)
         self._outbox.append(CommandAck(self._source, message.command, result, 0, 0, *message.source))
-        if reason:
+        if reason and result == mavlink.MAV_RESULT_UNSUPPORTED:
+            self._status_text.mention(reason, now)
+        elif reason:
             self._status_text.complain(reason, now)
 
     def _change_mode(self, message: SetMode, now: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import stat
@@ -133,3 +134,14 @@ def test_keys_are_equal_if_their_bytes_are(one: bytes, other: bytes) -> None:
 def test_a_key_has_32_bytes(length: int) -> None:
     with pytest.raises(ValueError, match="32 bytes"):
         Key(bytes(length))
+
+
+def test_a_key_that_could_not_be_written_leaves_no_file(tmp_path, monkeypatch):
+    def full(_number: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    path = tmp_path / "fleet.key"
+    with pytest.raises(KeyFileError, match="No space left on device"):
+        create_key(path)
+    assert not path.exists()

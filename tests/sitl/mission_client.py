@@ -84,6 +84,6 @@ def download(client: Client, of: int = 0) -> list[Any]:
 
 
 def ways(items: list[Any]) -> list[str]:
-    """What items say, so that a NaN is equal to itself, but a mission's item 0: ArduPilot sends home there."""
+    """What items say, so that a NaN is equal to itself; not a mission's item 0, an ArduPilot's home."""
     kept = [m for m in items if (m.seq, m.mission_type) != (0, 0)]
     return [repr([getattr(m, name) for name in SAID]) for m in kept]

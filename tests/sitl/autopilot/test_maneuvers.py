@@ -51,8 +51,13 @@ def test_reposition_flies_to_a_place_no_faster_than_asked(flavour):
     assert fastest == pytest.approx(2.0, abs=0.05)
     assert np.linalg.norm(rig.position - (20.0, -10.0, -9.0)) < 0.1
     assert rig.autopilot.mode is (Mode.GUIDED if flavour == "ardupilot" else Mode.HOLD)
-    # Only PX4 reads a yaw from it.
-    assert rig.autopilot.estimate.yaw == pytest.approx(0.7 if flavour == "px4" else 0.0, abs=0.02)
+    # Only PX4 reads a yaw from it; an ArduCopter faces its way.
+    faced = math.atan2(-10.0, 20.0)
+    assert rig.autopilot.estimate.yaw == pytest.approx(0.7 if flavour == "px4" else faced, abs=0.02)
+    if flavour == "ardupilot":
+        assert reposition(rig, 20.0, -9.0, 9.0) == [ACCEPTED]
+        rig.run(5.0)
+        assert rig.autopilot.estimate.yaw == pytest.approx(faced, abs=0.02)
 
 
 def test_reposition_changes_the_mode_only_if_it_may():

@@ -392,3 +392,27 @@ def test_a_motor_that_does_not_exist_cannot_be_stopped(instance):
     client = up("px4", failures="obeyed")
     assert client.command(420, 101, 1, instance) == 2
     assert client.command(420, 101, 1, 1) == 0
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_no_client_switches_the_heartbeat_of_all_off(flavour):
+    client = up(flavour, streams="normal")
+    for interval in (-1, 1_000_001, 1e9):
+        assert client.command(SET_INTERVAL, 0, interval) == 2
+    assert client.command(SET_INTERVAL, 0, 500_000) == 0
+    assert client.command(SET_INTERVAL, 0, 0) == 0
+    beats = [m for m in client.wait(5.0) if m.get_type() == "HEARTBEAT"]
+    assert len(beats) in (4, 5, 6)
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_what_a_client_polls_for_in_vain_is_mentioned_once(flavour):
+    """As MAVSDK polls for a camera: each request is answered, and one text says why."""
+    client = up(flavour)
+    said = []
+    for _ in range(10):
+        found = client.send(dialect.MAVLink_command_long_message(11, 1, REQUEST, 0, 259, 0, 0, 0, 0, 0, 0))
+        assert [m.result for m in found if m.get_type() == "COMMAND_ACK"] == [3]
+        found += client.wait(1.5)
+        said += [m.text for m in found if m.get_type() == "STATUSTEXT" and "259" in m.text]
+    assert len(said) == 1
