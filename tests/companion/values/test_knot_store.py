@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -33,23 +30,3 @@ def test_rows_are_used_again() -> None:
     for _ in range(1000):
         store.row_of(np.zeros((17, 9)))
     assert len(store.knots) == len(KnotStore().knots)
-
-
-def test_threads_may_share_a_store() -> None:
-    store = KnotStore()
-
-    def uses(number: float) -> bool:
-        sound = True
-        for size in range(1, 400):
-            knots = np.full((1 + size % 7, 9), number)
-            row = store.row_of(knots)
-            sound = sound and np.array_equal(store.knots[row, : len(knots)], knots)
-        return sound
-
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)
-    try:
-        with ThreadPoolExecutor(4) as pool:
-            assert all(pool.map(uses, (1.0, 2.0, 3.0, 4.0)))
-    finally:
-        sys.setswitchinterval(interval)
