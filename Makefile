@@ -6,7 +6,7 @@ BIN = .venv/bin
 SCRIPTS = tools/bootstrap.py tools/client_environments.py tools/extract_log.py
 CLIENTS = tests/clients/requirements
 
-.PHONY: fly test slow trial soak lint bench schemas docs requirements clean
+.PHONY: fly test slow trial soak lint bench schemas docs site requirements clean
 .DEFAULT_GOAL := fly
 
 fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--method tangential …"
@@ -39,6 +39,10 @@ schemas: .venv/.made  ## write config/schemas anew after a change of a configura
 
 docs: .venv/.made  ## write the reference pages in docs anew: Python interface, settings
 	@$(BIN)/python -m reference
+
+site:  ## the pages of docs as a site in build/site, with mkdocs-material in an environment of its own
+	@test -x build/mkdocs/bin/mkdocs || ($(PYTHON) -m venv build/mkdocs && build/mkdocs/bin/pip install -q "mkdocs<2" "mkdocs-material>=9.5,<10")
+	@NO_MKDOCS_2_WARNING=1 build/mkdocs/bin/mkdocs build -q
 
 requirements:  ## write uv.lock and requirements.txt anew after a change of dependencies; needs uv
 	@uv lock

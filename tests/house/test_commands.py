@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -102,9 +103,11 @@ def test_a_shown_program_runs(page: str, text: str, tmp_path: Path, monkeypatch:
 
 def test_every_page_is_in_the_index() -> None:
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    site = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     for page in PAGES:
         if page.parent == ROOT / "docs" and page.name != "index.md":
             assert f"]({page.name}" in index, page.name
+            assert re.search(rf"[ \[]{page.name}\b", site), page.name
 
 
 def test_readme_is_short() -> None:

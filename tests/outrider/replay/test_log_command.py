@@ -331,3 +331,10 @@ def test_a_damaged_log_is_listened_to_all_the_same(damage: list[tuple[int, bytes
     assert found.finite
     assert (found.max_speed_m_s or 0.0) <= np.linalg.norm(config.limits.v_max)
     assert (found.max_acceleration_m_s2 or 0.0) <= config.limits.a_total + 1e-3
+
+
+def test_a_log_without_what_planning_needs_ends_with_1_and_says_so(run: Run) -> None:
+    """The recorded target's log holds positions only."""
+    ended = run("replay", str(LOGS / "escort-target.tlog"), "--own", "1", "--out", "said")
+    assert ended.status == 1
+    assert "nothing would have been sent: the log lacks a heartbeat of the autopilot" in ended.err

@@ -32,11 +32,11 @@ Pacing = Callable[[Iterable[Record]], Iterable[Record]]
 
 
 def replay_log(log: Path, cast: Roles, like: str, out: Path | None, as_json: bool, pacing: Pacing) -> int:
-    """Run a companion over ``log`` with the settings of scenario ``like``, report, and return 0.
+    """Run a companion over ``log`` with the settings of scenario ``like``, and report.
 
-    The report says what it would have sent. ``setpoints.csv``, ``replay.json`` and ``replay.png`` are written
-    to ``out``. Raises InputError for a log that cannot be read, for ids that are not in it, and for certified
-    avoidance.
+    Returns the exit status: 0, or 1 if the companion would have sent nothing. ``setpoints.csv``,
+    ``replay.json`` and ``replay.png`` are written to ``out``. Raises InputError for a log that cannot be read,
+    for ids that are not in it, and for certified avoidance.
     """
     config = load(find("scenarios", like), Scenario).companion
     if config.avoidance == "certified":
@@ -54,7 +54,11 @@ def replay_log(log: Path, cast: Roles, like: str, out: Path | None, as_json: boo
     except LogError as error:
         raise InputError(str(error)) from None
     _tell(f"{log.name} · vehicle {cast.own}", found, directory, as_json)
-    return 0
+    if found.would:
+        return 0
+    missing = max(found.reasons, key=lambda reason: found.reasons[reason], default="any message of it")
+    sys.stderr.write(f"outrider: {log}: nothing would have been sent: the log lacks {missing}\n")
+    return 1
 
 
 def chasing(log: Path, target: int, like: str, out: Path | None, as_json: bool) -> int:
