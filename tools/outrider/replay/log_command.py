@@ -35,8 +35,8 @@ def replay_log(log: Path, cast: Roles, like: str, out: Path | None, as_json: boo
     """Run a companion over ``log`` with the settings of scenario ``like``, and report.
 
     Returns the exit status: 0, or 1 if the companion would have sent nothing. ``setpoints.csv``,
-    ``replay.json`` and ``replay.png`` are written to ``out``. Raises InputError for a log that cannot be read,
-    for ids that are not in it, and for certified avoidance.
+    ``replay.json`` and ``replay.png`` are written to ``out``. Raises InputError for a log that cannot be
+    read, for ids that are not in it, and for certified avoidance.
     """
     config = load(find("scenarios", like), Scenario).companion
     if config.avoidance == "certified":
