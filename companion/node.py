@@ -191,7 +191,8 @@ class Companion:
         leaving = self.pilot.phase in (Phase.LAND, Phase.DONE) or (self._finishing and self.pilot.streaming)
         announced = self.avoidance.messages(now, farewell=leaving or self.avoidance.parked)
         autopilot = [*commands, *requests, *setpoints, *shared.autopilot]
-        swarm, ground = [*shared.swarm, *announced], answers
+        detections = self._sharing.detections(self.world.forwards(now))
+        swarm, ground = [*shared.swarm, *detections, *announced], answers
         if self._reports_on:
             reports = self._reports(now)
             autopilot += reports.get("autopilot", ())
