@@ -45,7 +45,8 @@ class CameraLinks:
     ) -> None:
         """Receive a message of the own camera at ``now`` (µs).
 
-        ``when`` converts a stamp of the autopilot's clock to a time (µs); ``vehicle``: own state at ``now``.
+        ``when`` converts a stamp of the autopilot's clock to a time (µs), and returns None for one from the
+        future; ``vehicle``: own state at ``now``.
         """
         if isinstance(message, CameraFovStatus):
             self._views[message.source] = now, message
@@ -59,7 +60,11 @@ class CameraLinks:
             message = found
         time = now - self._source.latency_us
         if view is not None:
-            time = when(view.time_boot) or time
+            taken = when(view.time_boot)
+            if taken is None:
+                self._target.drop()
+                return
+            time = taken
         elif vehicle is not None:
             place = vehicle.position - 1e-6 * (now - time) * vehicle.velocity
             view = CameraFovStatus(

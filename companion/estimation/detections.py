@@ -1,8 +1,8 @@
 """Detections of a target by cameras, as the fusion filter takes them.
 
 A detection says where the target is: along the ray with σ_s, which a known height of the target makes large,
-and across it with σ_t. CAMERA_TRACKING_GEO_STATUS gives the horizontal accuracy h = √(σ_along² + σ_t²) and the
-vertical one v; with the elevation β of the ray σ_along = σ_s cos β and v² = σ_s² sin² β + σ_t² cos² β, so
+and across it with σ_t. CAMERA_TRACKING_GEO_STATUS gives the horizontal accuracy h = √(σ_along² + σ_t²) and
+the vertical one v; with the elevation β of the ray σ_along = σ_s cos β and v² = σ_s² sin² β + σ_t² cos² β, so
 σ_s² = h² + v² − 2σ_t². A message with a velocity is an estimate: a tracker has filtered it.
 """
 
@@ -27,8 +27,7 @@ _MIN_SIGMA_M = 0.01
 class Detection(NamedTuple):
     """Detection of the target by the camera of ``vehicle`` in an image taken at ``time`` (µs).
 
-    ``fields`` (FIELDS,): place and covariance of the camera alone, and the derivatives of the place by yaw
-    and by the elevation of the ray, as ``fusion_filter`` takes them. ``estimate``: whether it is an estimate
+    ``fields`` (FIELDS,): as ``fusion_filter`` takes them. ``estimate``: whether it is an estimate
     that may have detections in common with others. ``weight`` (1/m²): w_k of the camera at this distance,
     with the errors of the vehicle. ``message``: as received.
     """
@@ -62,8 +61,8 @@ def detection(
     left = np.array([-ray[1], ray[0], 0.0])
     up = np.cross(ray, left / level) if level > 1e-6 else np.array([1.0, 0.0, 0.0])
     white = errors.sigma_white**2
-    covariance = (across**2 + white) * np.eye(3) + (along**2 - across**2) * np.outer(ray, ray)
-    fields = np.concatenate([place, covariance.ravel(), distance * left, distance * up])
+    covariance = across**2 * np.eye(3) + (along**2 - across**2) * np.outer(ray, ray)
+    fields = np.concatenate([place, covariance.ravel(), left, up, camera, [distance]])
     estimate = message.velocity_ned is not None
     if fields.shape != (FIELDS,) or not np.isfinite(fields).all():
         return None

@@ -24,8 +24,6 @@ from companion.values.mates import Sight
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo
 
-_EARLY_US = 50_000
-"""A detection is from the future if its image is so much (µs) after now: clocks are not better than that."""
 _MAX_DISTANCE_M = 1e5
 _RECENT_US = 2_000_000
 """Time (µs) over which the cameras' weights are measured."""
@@ -92,7 +90,7 @@ class FusedTarget:
 
         ``view``: of the same image. Return whether the detection counts.
         """
-        found = self._detection(now, time, camera, message)
+        found = self._detection(time, camera, message)
         if found is None:
             self._invalid += 1
             return False
@@ -144,7 +142,7 @@ class FusedTarget:
         return None if known is None else known.covariance
 
     def sight(self, now: int, ahead: float) -> Sight:
-        """Return what is known beside the state; ``ahead`` (s): time from ``now`` (µs) to the horizon's end."""
+        """Return what is known beside the state; the horizon ends ``ahead`` (s) after ``now`` (µs)."""
         recent = self._fusion.recent(now - _RECENT_US - self._source.latency_us)
         if not recent:
             return Sight()
@@ -159,17 +157,15 @@ class FusedTarget:
             prior = -complex(0.5 * (information[0, 0] - information[1, 1]), information[0, 1])
         return Sight(MappingProxyType(weights), prior)
 
-    def _detection(
-        self, now: int, time: int, camera: Array | None, message: CameraTrackingGeo
-    ) -> Detection | None:
+    def _detection(self, time: int, camera: Array | None, message: CameraTrackingGeo) -> Detection | None:
         source = self._source
         tracks = message.status == mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE
         other = source.device is not None and message.device != source.device
         system = message.source.system
         strange = bool(source.vehicles) and system not in source.vehicles and system != self._system
-        if camera is None or not tracks or other or strange or time > now + _EARLY_US:
+        if camera is None or not tracks or other or strange:
             return None
         place = np.array(self._fleet.to_east_north_up(message.latitude, message.longitude, message.altitude))
         if not (isfinite(float(place.sum())) and float(place @ place) <= _MAX_DISTANCE_M**2):
             return None
-        return detection(source, system, min(time, now), place, camera, message)
+        return detection(source, system, time, place, camera, message)

@@ -55,7 +55,7 @@ class Fusion:
         self._window = window
         self._noise = _noise(config)
         self._density = config.sigma_acceleration**2
-        self._variances = self._noise[2::2]
+        self._variances = self._noise[2:12:2]
         self._slots: dict[int, int] = {}
         self._detections: list[Detection] = []
         self._pending: list[Detection] = []
@@ -123,7 +123,7 @@ class Fusion:
         return Belief(passed, x[:3] + moving * x[3:6], velocity, covariance)
 
     def recent(self, since: int) -> dict[int, list[float]]:
-        """Return w_k of the detections that passed and whose images are from ``since`` (µs) on, by vehicle."""
+        """Return w_k of the detections of images from ``since`` (µs) on that passed, by vehicle."""
         self._process()
         found: dict[int, list[float]] = {}
         first = int(np.searchsorted(self._times[: len(self._detections)], since))
@@ -272,4 +272,4 @@ def _noise(config: FusedSource) -> Array:
     tilt = radians(errors.sigma_tilt_deg) ** 2
     parts = [horizontal, position, horizontal, position, vertical, position]
     parts += [yaw, 1.0 / errors.yaw_s, tilt, 1.0 / errors.tilt_s]
-    return np.array([config.sigma_acceleration**2, config.gate, *parts])
+    return np.array([config.sigma_acceleration**2, config.gate, *parts, errors.sigma_white**2])

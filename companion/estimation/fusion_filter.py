@@ -18,8 +18,22 @@ from companion.values.horizon import Array
 
 TARGET, PER_VEHICLE = 6, 5
 """Number of states of the target, and of each vehicle."""
-FIELDS = 18
-"""Numbers of a detection: place (3), covariance R (9, by rows), derivatives by yaw (3) and elevation (3)."""
+FIELDS = 22
+"""Numbers of a detection.
+
+Place (3), covariance R of the camera alone (9, by rows), directions (3) into which yaw and elevation of the
+ray move the place, the camera's place (3), and the measured distance; m.
+"""
+_KNOWN, _LEAST_SCALE = 25.0, 0.25
+"""m²: with a smaller trace of the place's covariance, the distance to the estimated place is used.
+
+Errors of yaw move the place in proportion to the true distance, and errors of pixels and height grow with it.
+With the measured distance the filter would learn the yaw from its noise, and would trust too short distances
+more than too long ones: a bias of 2σ² of the relative error. R is scaled by the square of the ratio, within
+limits.
+"""
+_GAIN = 0.999
+"""An estimate by others is used if it lowers the trace to less than this share."""
 MEMORY = 0.1
 """Weight of a detection in the mean d² of its vehicle."""
 SUSPECT = 2.0
@@ -85,7 +99,7 @@ def _own_share(P: Array, R: Array) -> float:
                 C[i, j] = share * A[i, j] + (1.0 - share) * B[i, j]
         _inverse(C, D)
         trace = D[0, 0] + D[1, 1] + D[2, 2]
-        if trace < least:
+        if trace < _GAIN * least:
             best, least = share, trace
     return best
 
@@ -129,11 +143,11 @@ def replay(
 
     ``times`` (N,), µs, ascending; ``slots`` (N,): index of the detecting vehicle, negative: the place is an
     estimate that may share detections with this one, combined by covariance intersection; ``data``
-    (N, FIELDS). ``x0``
-    (n,), ``P0`` (n, n), ``means0`` (M,): before the first detection, at ``began`` (µs). ``noise`` (12,):
-    spectral density of the acceleration, gate, then variance and rate of decay (1/s) of the five errors of a
-    vehicle. ``X`` (N, n), ``PP`` (N, n, n), ``means`` (N, M): after each detection; ``used`` (N,): whether it
-    passed; ``nis`` (N,): its d².
+    (N, FIELDS). ``x0`` (n,), ``P0`` (n, n), ``means0`` (M,): before the first detection, at ``began`` (µs).
+    ``noise`` (13,): spectral density of the acceleration, gate, variance and rate of decay (1/s) of each of
+    the five errors of a vehicle, and the variance of its position that is not in common (m²). ``X`` (N, n),
+    ``PP`` (N, n, n), ``means`` (N, M): after each detection; ``used`` (N,): whether it passed; ``nis`` (N,):
+    its d².
     """
     n, vehicles = len(x0), len(means0)
     B, K, S, T = np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -153,8 +167,20 @@ def replay(
         for a in range(3):
             for b in range(3):
                 R[a, b], place[a, b] = data[i, 3 + 3 * a + b], P[a, b]
+        distance = data[i, 21]
+        if slot >= 0:
+            if place[0, 0] + place[1, 1] + place[2, 2] < _KNOWN:
+                square = 0.0
+                for a in range(3):
+                    square += (x[a] - data[i, 18 + a]) ** 2
+                distance = sqrt(square)
+            scale = min(max((distance / data[i, 21]) ** 2, _LEAST_SCALE), 1.0 / _LEAST_SCALE)
+            for a in range(3):
+                for b in range(3):
+                    R[a, b] *= scale
+                R[a, a] += noise[12]
         for a in range(3):
-            g, h = data[i, 12 + a], data[i, 15 + a]
+            g, h = distance * data[i, 12 + a], distance * data[i, 15 + a]
             y[a] = data[i, a] - x[a]
             if slot >= 0:
                 y[a] -= x[base + a] + g * x[base + 3] + h * x[base + 4]
@@ -164,7 +190,7 @@ def replay(
                     B[j, a] += P[j, base + a] + g * P[j, base + 3] + h * P[j, base + 4]
         for a in range(3):
             for b in range(3):
-                g, h = data[i, 12 + a], data[i, 15 + a]
+                g, h = distance * data[i, 12 + a], distance * data[i, 15 + a]
                 S[a, b] = B[a, b] + R[a, b]
                 if slot >= 0:
                     S[a, b] += B[base + a, b] + g * B[base + 3, b] + h * B[base + 4, b]

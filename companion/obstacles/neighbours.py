@@ -360,8 +360,8 @@ class Neighbours:
     def when(self, system: int, now: int, stamp: int) -> int | None:
         """Return when (µs) what a companion stamped with ``stamp`` (µs, 0 for none) was true.
 
-        It arrived at ``now`` (µs). Returns None for a system that is no vehicle of the fleet: whose companion
-        does not report a fresh position.
+        It arrived at ``now`` (µs). Returns None for a stamp from the future, and for a system that is no
+        vehicle of the fleet: whose companion does not report a fresh position.
         """
         sender = self._senders.get(system)
         if sender is None or sender.by_autopilot or system in self._moving_obstacles:
@@ -369,7 +369,7 @@ class Neighbours:
         time = sender.track.time
         if time is None or now - time > _FLEET_US:
             return None
-        return sender.track.when(now, stamp)
+        return sender.track.dated(now, stamp)
 
     def last_received(self) -> list[tuple[int, int, Array, Array]]:
         """Return system id, time (µs), position (3,) and velocity (3,) of each neighbour's last state."""
