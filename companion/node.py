@@ -115,7 +115,8 @@ class Companion:
     @property
     def tally(self) -> Tally:
         """Counters for the summary."""
-        return self.avoidance.tally
+        fusion = self.world.fusion
+        return self.avoidance.tally if fusion is None else self.avoidance.tally._replace(fusion=fusion)
 
     @property
     def plan_log(self) -> PlanLog:
@@ -154,6 +155,7 @@ class Companion:
         Call this regularly in processes that run for days; both grow with every plan.
         """
         self.avoidance.shed()
+        self.world.shed()
         return self._times.shed()
 
     def finish(self) -> None:

@@ -12,6 +12,7 @@ from companion.config import CompanionConfig
 from companion.config.target_source import FusedSource
 from companion.estimation.camera_links import CAMERA_MESSAGES, CameraLinks, CameraMessage
 from companion.estimation.fused_target import FusedTarget, Outgoing
+from companion.estimation.fusion_log import FusionTally
 from companion.estimation.origins import Origins
 from companion.estimation.target import Target
 from companion.estimation.time_sync import Answer
@@ -140,6 +141,16 @@ class World:
             return []
         return self.target.outgoing(now)
 
+    @property
+    def fusion(self) -> FusionTally | None:
+        """Counters and log of the fusion of detections; None without it."""
+        return self.target.tally if isinstance(self.target, FusedTarget) else None
+
+    def shed(self) -> None:
+        """Empty the log of the fusion of detections."""
+        if isinstance(self.target, FusedTarget):
+            self.target.shed()
+
     def sight(self, now: int, ahead: float) -> Sight:
         """Return what is known of the target beside its state; ``ahead`` (s): from ``now`` (µs) on."""
         return self.target.sight(now, ahead) if isinstance(self.target, FusedTarget) else Sight()
@@ -152,6 +163,8 @@ class World:
     def at(self, now: int) -> View:
         """Return the view at ``now`` (µs)."""
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
+        if isinstance(self.target, FusedTarget):
+            self.target.record(now)
         own, last = self._own.at(now), self.target.last(now)
         adrift = now - self._last_position_at if own is None and self._last_in_old_frame is not None else 0
         return View(own, yaw, self.target.fresh(last), self._local, last, adrift)

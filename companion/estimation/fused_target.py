@@ -18,6 +18,7 @@ from companion.config.target_source import FusedSource
 from companion.estimation.detections import Detection, detection
 from companion.estimation.fusion import Fusion
 from companion.estimation.fusion_filter import worst_sigma
+from companion.estimation.fusion_log import Counts, FusionLog, FusionTally
 from companion.estimation.tracks import State
 from companion.values.horizon import Array
 from companion.values.mates import Sight
@@ -25,8 +26,8 @@ from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo
 
 _MAX_DISTANCE_M = 1e5
-_RECENT_US = 2_000_000
-"""Time (µs) over which the cameras' weights are measured."""
+_RECENT_US, _SEEN_US = 2_000_000, 500_000
+"""Time (µs) over which the cameras' weights are measured, and in which a detection counts as seeing now."""
 
 
 class Outgoing(NamedTuple):
@@ -37,18 +38,8 @@ class Outgoing(NamedTuple):
     message: CameraTrackingGeo
 
 
-class Counts(NamedTuple):
-    """Numbers of detections: ``own`` and of ``others`` that count, ``used`` and ``refused`` by the gate.
-
-    ``late``: older than the window; ``invalid``: dropped before the filter, for whatever reason.
-    """
-
-    own: int
-    others: int
-    used: int
-    refused: int
-    late: int
-    invalid: int
+_ENOUGH = 0.5
+"""A camera with this share of the detections of the best one counts in full, one with fewer in proportion."""
 
 
 class FusedTarget:
@@ -60,14 +51,33 @@ class FusedTarget:
         self._own = self._others = self._invalid = 0
         self._waiting: Outgoing | None = None
         self._next = 0
-        self.sent = 0
-        """Number of own detections that were forwarded."""
+        self._sent = 0
+        self._log = FusionLog()
 
     @property
     def counts(self) -> Counts:
         """Numbers of detections so far."""
         fusion = self._fusion
-        return Counts(self._own, self._others, fusion.used, fusion.refused, fusion.late, self._invalid)
+        numbers = self._own, self._others, self._sent, fusion.used, fusion.refused, fusion.late
+        return Counts(*numbers, self._invalid)
+
+    @property
+    def tally(self) -> FusionTally:
+        """Counters and log for the summary."""
+        return self._log.tally(self.counts)
+
+    def shed(self) -> None:
+        """Empty the log."""
+        self._log.clear()
+
+    def record(self, now: int) -> None:
+        """Add a row to the log if one is due at ``now`` (µs)."""
+        if not self._log.due(now):
+            return
+        known = self._fusion.at(now, self._config.target.extrapolate_us)
+        if known is not None:
+            seen_by = len(self._fusion.recent(now - _SEEN_US - self._source.latency_us))
+            self._log.add(now, known.position, known.covariance, seen_by)
 
     @property
     def refused(self) -> int:
@@ -112,7 +122,7 @@ class FusedTarget:
         period = self._config.rates.detection_us
         # A camera of the same period is not slowed down by jitter of its messages.
         self._next = max(self._next, now - period // 2) + period
-        self.sent += 1
+        self._sent += 1
         return [waiting]
 
     def at(self, now: int) -> State | None:
@@ -146,9 +156,12 @@ class FusedTarget:
         recent = self._fusion.recent(now - _RECENT_US - self._source.latency_us)
         if not recent:
             return Sight()
-        # A camera that sees the target in every second image counts half.
-        most = max(len(weights) for weights in recent.values())
-        weights = {system: sum(weights) / most for system, weights in recent.items()}
+        weights = {}
+        for system, found in recent.items():
+            # Messages of all neighbours are lost, but none of the own: each is compared with the others' best.
+            others = [len(one) for other, one in recent.items() if other not in (system, self._system)]
+            seen = min(1.0, len(found) / max(_ENOUGH * max(others, default=0), 1.0))
+            weights[system] = seen * sum(found) / len(found)
         covariance = self.covariance(now + round(1e6 * ahead))
         prior = 0j
         if covariance is not None:

@@ -83,8 +83,8 @@ _USB: Final = "ttyACM"
 def said(config: CompanionConfig, signed: bool, vehicles: int = FLEET) -> float:
     """Return the maximum bytes per second of one companion of ``vehicles`` on the swarm link.
 
-    They are states, plans, forwarded detections, heartbeats and, in certified mode, all of ``agreed``. MAVLink 2 truncates zeros at
-    the end of a message, so a vehicle at rest sends less.
+    They are states, plans, forwarded detections, heartbeats and, in certified mode, all of ``agreed``.
+    MAVLink 2 truncates zeros at the end of a message, so a vehicle at rest sends less.
     """
     rates = config.rates
     if config.avoidance == "certified":

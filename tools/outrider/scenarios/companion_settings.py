@@ -32,19 +32,24 @@ def settings_of(scenario: Scenario) -> CompanionConfig:
         changes["certified"] = companion.certified.model_copy(update={"fleet": fleet})
     source = companion.target_source
     if isinstance(source, FusedSource) and source.own_errors is None:
-        changes["target_source"] = source.model_copy(update={"own_errors": own_errors(profile)})
+        changes["target_source"] = source.model_copy(update={"own_errors": own_errors(profile, scenario)})
     return companion.model_copy(update=changes)
 
 
-def own_errors(profile: SensorProfile) -> OwnErrors:
-    """Return the errors of a vehicle's own estimate with the sensors of ``profile``."""
+def own_errors(profile: SensorProfile, scenario: Scenario | None = None) -> OwnErrors:
+    """Return the errors of a vehicle's own estimate with the sensors of ``profile``.
+
+    Those of roll and pitch are not in the detections of the ``scenario`` if gimbals stabilise all cameras.
+    """
+    cameras = [] if scenario is None else [scenario.camera, *(one.camera for one in scenario.cameras)]
+    mounts = {one.mount.kind for one in cameras if one is not None}
     return OwnErrors(
         sigma_horizontal=profile.horizontal_drift,
         sigma_vertical=profile.vertical_drift,
         position_s=profile.drift_time,
         sigma_yaw_deg=degrees(profile.yaw),
         yaw_s=profile.yaw_time,
-        sigma_tilt_deg=degrees(profile.tilt),
+        sigma_tilt_deg=0.0 if mounts == {"gimbal"} else degrees(profile.tilt),
         tilt_s=profile.tilt_time,
         sigma_white=hypot(profile.position_white, _MESSAGE_ERROR_M),
     )
