@@ -158,7 +158,7 @@ class FusedTarget:
             return Sight()
         weights = {}
         for system, found in recent.items():
-            # Messages of all neighbours are lost, but none of the own: each is compared with the others' best.
+            # Messages of neighbours are lost, none of the own: a camera is compared with others.
             others = [len(one) for other, one in recent.items() if other not in (system, self._system)]
             seen = min(1.0, len(found) / max(_ENOUGH * max(others, default=0), 1.0))
             weights[system] = seen * sum(found) / len(found)
