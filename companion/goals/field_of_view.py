@@ -33,8 +33,9 @@ def in_view(config: FieldOfView, offset: Array, sigma: float) -> Array:
     off_axis = 0.0
     if config.pitch_deg is not None:
         pitch = radians(config.pitch_deg)
-        # With less room than the margin the target is kept on the optical axis.
-        room = max(half - atan2(size, hypot(across, up)), 0.0)
+        # The margin at the least distance of this height is enough at every other. With less room than that
+        # the target is kept on the optical axis.
+        room = max(half - atan2(size, up), 0.0)
         elevation = min(max(atan2(up, across), pitch - room), pitch + room)
         elevation = min(max(elevation, asin(up / longest)), _STEEPEST)
         wanted = up / tan(elevation)

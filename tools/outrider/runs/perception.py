@@ -33,7 +33,8 @@ class Estimates(NamedTuple):
     def nees(self) -> Array:
         """Squared error (n,) relative to the covariance; 3 on average if that is right."""
         solved = np.linalg.solve(self.covariances, self.errors[..., None])[..., 0]
-        return np.vecdot(self.errors, solved)
+        result: Array = np.vecdot(self.errors, solved)
+        return result
 
 
 def estimates(flight: Outcome, samples: Samples) -> Estimates:

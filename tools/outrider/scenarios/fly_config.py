@@ -36,7 +36,7 @@ class Radio(Settings):
     detection_us: int
 
 
-RADIOS = {57600: Radio(state_us=400_000, plan_us=540_000, plan_stale_us=1_200_000, detection_us=2_000_000)}
+RADIOS = {57600: Radio(state_us=400_000, plan_us=540_000, plan_stale_us=1_200_000, detection_us=3_000_000)}
 """Rates by the baud of a radio that eight vehicles and their target share, signed or not (``link_budget``).
 
 A receiver that misses one plan continues with the previous plan, which is 1.6 s long.
