@@ -1,4 +1,4 @@
-"""Figures of fused detections: errors by the truth at their time, counters of all, quality of the bearings."""
+"""Figures of fused detections: errors by the truth at their time, counters, quality of the bearings."""
 
 from __future__ import annotations
 
