@@ -115,7 +115,8 @@ class Companion:
     @property
     def tally(self) -> Tally:
         """Counters for the summary."""
-        return self.avoidance.tally
+        fusion = self.world.fusion
+        return self.avoidance.tally if fusion is None else self.avoidance.tally._replace(fusion=fusion)
 
     @property
     def plan_log(self) -> PlanLog:
@@ -154,6 +155,7 @@ class Companion:
         Call this regularly in processes that run for days; both grow with every plan.
         """
         self.avoidance.shed()
+        self.world.shed()
         return self._times.shed()
 
     def finish(self) -> None:
@@ -191,7 +193,8 @@ class Companion:
         leaving = self.pilot.phase in (Phase.LAND, Phase.DONE) or (self._finishing and self.pilot.streaming)
         announced = self.avoidance.messages(now, farewell=leaving or self.avoidance.parked)
         autopilot = [*commands, *requests, *setpoints, *shared.autopilot]
-        swarm, ground = [*shared.swarm, *announced], answers
+        detections = self._sharing.detections(self.world.forwards(now))
+        swarm, ground = [*shared.swarm, *detections, *announced], answers
         if self._reports_on:
             reports = self._reports(now)
             autopilot += reports.get("autopilot", ())

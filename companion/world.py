@@ -9,6 +9,10 @@ import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
+from companion.config.target_source import FusedSource
+from companion.estimation.camera_links import CAMERA_MESSAGES, CameraLinks, CameraMessage
+from companion.estimation.fused_target import FusedTarget, Outgoing
+from companion.estimation.fusion_log import FusionTally
 from companion.estimation.origins import Origins
 from companion.estimation.target import Target
 from companion.estimation.time_sync import Answer
@@ -18,6 +22,7 @@ from companion.obstacles.neighbours import Neighbours
 from companion.obstacles.sensed import Sensed, SensorPose
 from companion.obstacles.static import FixedObstacles
 from companion.values.horizon import Array
+from companion.values.mates import Sight
 from companion.values.obstacles import Obstacles
 from mavlink_bridge.frames import FleetFrame, LocalFrame
 from mavlink_bridge.messages import (
@@ -81,7 +86,14 @@ class World:
         self._system = system
         self._target_system = target_system
         self._own = Track(config.own)
-        self.target = Target(config, system, target_system, fleet)
+        source = config.target_source
+        self.target: Target | FusedTarget
+        self.cameras: CameraLinks | None = None
+        if isinstance(source, FusedSource):
+            self.target = fused = FusedTarget(config, source, system, fleet)
+            self.cameras = CameraLinks(source, fleet, fused)
+        else:
+            self.target = Target(config, system, target_system, fleet)
         self.sensed = Sensed(config, fleet)
         self._fixed = FixedObstacles(config.obstacles)
         self._moving = MovingObstacles(config.moving)
@@ -111,7 +123,9 @@ class World:
             self.neighbours.receive_position(now, message)
         elif link == "swarm" and isinstance(message, Tunnel):
             self.neighbours.receive_plan(now, message)
-        elif link == "target" or isinstance(message, CameraTrackingGeo):
+        elif self.cameras is not None and isinstance(message, CAMERA_MESSAGES):
+            self._receive_camera(now, link, message)
+        elif isinstance(self.target, Target) and (link == "target" or isinstance(message, CameraTrackingGeo)):
             self.target.receive(now, link, message)
         elif isinstance(message, ObstacleDistance):
             self._receive_distances(now, message)
@@ -121,6 +135,26 @@ class World:
         elif link == "autopilot" and message.source.system == self._system:
             self._receive_own(now, message)
 
+    def forwards(self, now: int) -> list[Outgoing]:
+        """Return the own detections to forward at ``now`` (µs), one in ``rates.detection_us`` at most."""
+        if not isinstance(self.target, FusedTarget):
+            return []
+        return self.target.outgoing(now)
+
+    @property
+    def fusion(self) -> FusionTally | None:
+        """Counters and log of the fusion of detections; None without it."""
+        return self.target.tally if isinstance(self.target, FusedTarget) else None
+
+    def shed(self) -> None:
+        """Empty the log of the fusion of detections."""
+        if isinstance(self.target, FusedTarget):
+            self.target.shed()
+
+    def sight(self, now: int, ahead: float) -> Sight:
+        """Return what is known of the target beside its state; ``ahead`` (s): from ``now`` (µs) on."""
+        return self.target.sight(now, ahead) if isinstance(self.target, FusedTarget) else Sight()
+
     @property
     def origin(self) -> tuple[float, float, float] | None:
         """The autopilot's origin: latitude and longitude (deg), altitude (m); None before it is received."""
@@ -129,6 +163,8 @@ class World:
     def at(self, now: int) -> View:
         """Return the view at ``now`` (µs)."""
         yaw = self._yaw if now - self._yaw_time <= self.config.guard.own_stale_us else None
+        if isinstance(self.target, FusedTarget):
+            self.target.record(now)
         own, last = self._own.at(now), self.target.last(now)
         adrift = now - self._last_position_at if own is None and self._last_in_old_frame is not None else 0
         return View(own, yaw, self.target.fresh(last), self._local, last, adrift)
@@ -210,6 +246,16 @@ class World:
                 radius=obstacles.radius + further,
             )
         return obstacles
+
+    def _receive_camera(self, now: int, link: str, message: CameraMessage) -> None:
+        """Process a message of the own camera, or one that a neighbour forwards, about a detection."""
+        if self.cameras is None:
+            return
+        system = message.source.system
+        if link == "swarm":
+            self.cameras.forwarded(now, message, lambda stamp: self.neighbours.when(system, now, stamp))
+        else:
+            self.cameras.own(now, message, lambda stamp: self._own.dated(now, stamp), self._own.at(now))
 
     def _receive_distances(self, now: int, message: ObstacleDistance) -> None:
         """Process an OBSTACLE_DISTANCE of the own system, with the vehicle's pose at measurement time."""

@@ -106,6 +106,9 @@ class RatesConfig(Settings):
     setpoint_us: Micros = Field(20_000, description="µs between set-points")
     state_us: Micros = Field(100_000, description="µs between messages of the own state to the others")
     plan_us: Micros = Field(100_000, description="µs between messages of the own plan to the others")
+    detection_us: Micros = Field(
+        100_000, description="µs between two forwarded detections, at least (target_source: fused)"
+    )
 
 
 class TrackingConfig(Settings):

@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.values.settings import Settings
+from companion.values.settings import Positive, Settings
 
 _Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
 
@@ -53,8 +53,71 @@ class FixedSource(Settings):
     at: tuple[_Coordinate, _Coordinate, _Coordinate] = Field(description="m, fleet-local ENU")
 
 
+class OwnErrors(Settings):
+    """Errors of a detecting vehicle's own estimate, which all its detections of some time have in common.
+
+    Each is a first-order Gauss–Markov process: σ, and the time constant of its autocorrelation.
+    """
+
+    sigma_horizontal: float = Field(0.5, ge=0.0, le=100.0, description="m, of the position, each axis")
+    sigma_vertical: float = Field(0.75, ge=0.0, le=100.0, description="m, of the height")
+    position_s: float = Field(45.0, gt=0.0, le=3600.0, description="s")
+    sigma_yaw_deg: float = Field(1.5, ge=0.0, le=45.0, description="degrees")
+    yaw_s: float = Field(120.0, gt=0.0, le=3600.0, description="s")
+    sigma_tilt_deg: float = Field(
+        0.5, ge=0.0, le=45.0, description="degrees, of the ray's elevation; near 0 with a stabilised gimbal"
+    )
+    tilt_s: float = Field(20.0, gt=0.0, le=3600.0, description="s")
+    sigma_white: float = Field(0.03, ge=0.0, le=10.0, description="m, of each position; not in common")
+
+
+class FusedSource(Settings):
+    """Detections of the own camera and of the neighbours', fused."""
+
+    kind: Literal["fused"]
+    share: bool = Field(True, description="forward the own detections on the swarm link")
+    vehicles: tuple[int, ...] = Field(
+        (),
+        max_length=64,
+        description="system ids whose detections count; empty: all companions whose position is received",
+    )
+    device: int | None = Field(
+        None, ge=0, le=255, description="camera_device_id of detections of the target; null: any"
+    )
+    latency_us: int = Field(
+        100_000,
+        ge=0,
+        le=5_000_000,
+        description="µs: age of a detection whose image's time (CAMERA_FOV_STATUS) is not sent",
+    )
+    height: float = Field(
+        1.8, gt=0.0, le=100.0, description="m, of the target, for cameras that send its place in the image"
+    )
+    sigma_height: float = Field(0.15, gt=0.0, le=10.0, description="m, σ of that from image to image")
+    sigma_row: float = Field(
+        0.003, gt=0.0, le=0.1, description="σ of an edge in the image, as a share of the image's height"
+    )
+    sigma_range_share: float = Field(
+        0.1, gt=0.0, le=1.0, description="σ along the ray per distance, where a camera does not say"
+    )
+    sigma_bearing_deg: float = Field(
+        0.3, gt=0.0, le=45.0, description="degrees, σ across the ray, where a camera does not say"
+    )
+    sigma_acceleration: Positive = Field(1.0, description="m/s², of the target's white acceleration")
+    own_errors: OwnErrors | None = Field(
+        None, description="of every vehicle; null: of the scenario's sensors, otherwise those of GNSS"
+    )
+    gate: Positive = Field(16.27, description="on d² = yᵀS⁻¹y, χ² of three: 99.9 % of what is true pass")
+
+    @property
+    def errors(self) -> OwnErrors:
+        """Errors of the vehicles' own estimates."""
+        return OwnErrors() if self.own_errors is None else self.own_errors
+
+
 TargetSource = Annotated[
-    GlobalPositionSource | FollowTargetSource | CameraSource | FixedSource, Field(discriminator="kind")
+    GlobalPositionSource | FollowTargetSource | CameraSource | FixedSource | FusedSource,
+    Field(discriminator="kind"),
 ]
 
 
@@ -70,6 +133,16 @@ _MESSAGES: Mapping[str, int] = MappingProxyType(
 def message_of(source: TargetSource) -> int | None:
     """Return the id of the MAVLink message that is used; None for a fixed place."""
     return _MESSAGES.get(source.kind)
+
+
+DETECTIONS = frozenset(
+    {
+        mavlink.MAVLINK_MSG_ID_CAMERA_FOV_STATUS,
+        mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS,
+        mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_IMAGE_STATUS,
+    }
+)
+"""Messages of detections to be fused."""
 
 
 def sender_of(source: TargetSource, system: int, target: int) -> int | None:

@@ -213,6 +213,15 @@ class SenderClock:
             return received - self._delay
         return min(stamp + self._base + self.skew, received - self._delay)
 
+    def ahead(self, received: int, stamp: int) -> int:
+        """Return by how much (µs) ``stamp`` is later than a message that arrived at ``received`` can be.
+
+        Negative for an earlier one; 0 without a stamp or before the first message.
+        """
+        if stamp <= 0 or self._base is None:
+            return 0
+        return stamp + self._base + self.skew - (received - self._delay)
+
     @property
     def late(self) -> int:
         """Delay (µs) of the fastest of the last few messages above the line; 0 for a ``brief`` clock."""

@@ -21,6 +21,8 @@ from companion.values.horizon import Array
 
 _MAX_DISTANCE_M, _MAX_SPEED_M_S = 1e5, 100.0
 """A measurement beyond either limit is rejected as implausible."""
+_EARLY_US = 50_000
+"""A stamp so much (µs) after a message's arrival is from the future: clocks are known better than that."""
 
 
 class State(NamedTuple):
@@ -152,6 +154,11 @@ class Track:
         The message arrived at ``received`` (own clock) with ``stamp`` (sender's clock, 0 for none), both µs.
         """
         return self._clock.reads(received, stamp if self._config.stamps else 0)
+
+    def dated(self, received: int, stamp: int) -> int | None:
+        """Return what ``when`` does, or None for a stamp from the future."""
+        used = stamp if self._config.stamps else 0
+        return None if self._clock.ahead(received, used) > _EARLY_US else self._clock.reads(received, used)
 
     def at(self, now: int) -> State | None:
         """Return the state extrapolated to ``now`` (µs), or None before the first measurement.

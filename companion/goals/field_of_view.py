@@ -7,7 +7,7 @@ is still narrower than the margin, it moves away along its ray, up to a limit.
 
 from __future__ import annotations
 
-from math import asin, atan, atan2, hypot, radians, tan
+from math import asin, atan2, hypot, radians, tan
 
 from companion.config.formation import FieldOfView
 from companion.values.horizon import Array
@@ -33,15 +33,16 @@ def in_view(config: FieldOfView, offset: Array, sigma: float) -> Array:
     off_axis = 0.0
     if config.pitch_deg is not None:
         pitch = radians(config.pitch_deg)
-        # With less room than the margin the target is kept on the optical axis.
-        room = max(half - atan2(size, hypot(across, up)), 0.0)
+        # The margin at the least distance of this height is enough at every other. With less room than that
+        # the target is kept on the optical axis.
+        room = max(half - atan2(size, up), 0.0)
         elevation = min(max(atan2(up, across), pitch - room), pitch + room)
         elevation = min(max(elevation, asin(up / longest)), _STEEPEST)
         wanted = up / tan(elevation)
         off_axis = abs(elevation - pitch)
     narrowest = min(half - off_axis, 0.5 * radians(config.width_deg))
     distance = hypot(wanted, up)
-    needed = size / tan(max(narrowest, atan(1e-3)))
+    needed = size / tan(max(narrowest, 1e-6))
     further = min(max(distance, needed), max(distance, longest)) / distance
     result: Array = offset.copy()
     result[:2] *= wanted * further / across

@@ -7,7 +7,7 @@ destination only, so every kind of avoidance keeps its constraints.
 
 from __future__ import annotations
 
-from math import hypot, pi
+from math import copysign, hypot, pi
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from companion.values.mates import Mates, Sight
 
 _ASIDE_RAD = 0.1
 """Turn by which a vehicle leaves a saddle, rad."""
+_REST_RAD = 0.03
+"""Smaller turns of the descent are not flown, and larger ones are smaller by this, rad."""
 _MIN_RADIUS_M = 0.5
 """Radius of the surface below which it is not turned along."""
 
@@ -58,6 +60,8 @@ class PerceptionFormation:
         if abs(s) > _ASIDE_RAD * total:
             turns = turns + aside(bearings, weights, sight.prior, _ASIDE_RAD)
         turn = formation.gain * float(turns[own])
+        # The last steps gain nothing, and noise would keep the vehicles moving.
+        turn = copysign(max(abs(turn) - _REST_RAD, 0.0), turn)
         occluders = [*self._fixed, *map(vehicle_occluder, mates.positions)]
         arcs = hidden_arcs(target, place, occluders, formation.clear)
         turn += formation.hidden_gain * way_out(float(bearings[own]), arcs, left=self._system % 2 == 0)

@@ -40,6 +40,8 @@ _SYSTEM_IDS = 255
 """Number of system ids."""
 _PRIORITY_US = 1_000_000
 """µs after a companion's position during which positions of the same vehicle's autopilot are ignored."""
+_FLEET_US = 5_000_000
+"""A vehicle whose companion has been silent for longer (µs) is no vehicle of the fleet."""
 _MAX_PLAN_DEVIATION = 1.0
 """m; if a neighbour is further than this from its plan, its track is used instead of the plan.
 
@@ -354,6 +356,20 @@ class Neighbours:
         for system in self._moving_obstacles & self._rows.keys():
             fresh[self._rows[system]] = False
         return fresh
+
+    def when(self, system: int, now: int, stamp: int) -> int | None:
+        """Return when (µs) what a companion stamped with ``stamp`` (µs, 0 for none) was true.
+
+        It arrived at ``now`` (µs). Returns None for a stamp from the future, and for a system that is no
+        vehicle of the fleet: whose companion does not report a fresh position.
+        """
+        sender = self._senders.get(system)
+        if sender is None or sender.by_autopilot or system in self._moving_obstacles:
+            return None
+        time = sender.track.time
+        if time is None or now - time > _FLEET_US:
+            return None
+        return sender.track.dated(now, stamp)
 
     def last_received(self) -> list[tuple[int, int, Array, Array]]:
         """Return system id, time (µs), position (3,) and velocity (3,) of each neighbour's last state."""

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 from companion.avoidance.field.plan_log import PlanLog
 from companion.avoidance.field.planner import Aim
 from companion.config.planning import MethodName
+from companion.estimation.fusion_log import FusionTally
 from companion.flight.guard import Holding
 from companion.flight.lowering import Lowered
 from companion.flight.tracking import Tracking
@@ -24,7 +25,7 @@ class Tally(NamedTuple):
     ``plans`` that were made, and how many of them with ``relaxed`` bounds; ``solver_failures``; ``held``: how
     often an old plan was kept; ``anchored_anew``: how often planning restarted at the measured position.
     ``plan_ns``: stopwatch reading (ns) of each attempt to plan, clipped to 4.29 s. ``plan_at``: time (µs on
-    the companion's clock) of the step that made the attempt.
+    the companion's clock) of the step that made the attempt. ``fusion``: of detections.
     """
 
     plans: int
@@ -34,6 +35,7 @@ class Tally(NamedTuple):
     anchored_anew: int
     plan_ns: Sequence[int]
     plan_at: Sequence[int] = ()
+    fusion: FusionTally = FusionTally()
 
 
 class AvoidanceInputs(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
+from companion.config.formation import Perception
 from companion.errors import SurfaceError
 from companion.flight.lowering import Lowered
 from companion.flight.state_machine import Pilot
@@ -15,7 +16,7 @@ from companion.goals.goals import Goals
 from companion.goals.heading import Heading, Yaw
 from companion.planning.avoidance import Avoidance, AvoidanceInputs
 from companion.values.horizon import Array, Motion
-from companion.values.mates import Mates
+from companion.values.mates import Mates, Sight
 from companion.values.obstacles import Obstacles
 from companion.values.phase import Phase
 from companion.values.stance import Stance
@@ -25,7 +26,7 @@ from mavlink_bridge.frames import LocalFrame
 
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
-_NO_MATES = Mates()
+_NO_MATES, _NO_SIGHT = Mates(), Sight()
 _NO_OBSTACLES = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
 
 
@@ -116,7 +117,10 @@ class Planning:
         try:
             mates = self._world.neighbours.mates(now) if self._config.shares_surface else _NO_MATES
             below = self._world.neighbours.below if self._config.guard.return_step else 0
-            aim = self._goals.aim(now, view, measured, obstacles, mates, below, cautious=cautious)
+            sight = _NO_SIGHT
+            if isinstance(self._config.formation, Perception):
+                sight = self._world.sight(now, self._avoidance.lookahead_s)
+            aim = self._goals.aim(now, view, measured, obstacles, mates, below, sight, cautious=cautious)
         except SurfaceError:
             return None
         if self._config.traffic is None:

@@ -7,7 +7,13 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
-from companion.config.target_source import CameraSource, message_of, sender_of
+from companion.config.target_source import (
+    DETECTIONS,
+    CameraSource,
+    FusedSource,
+    message_of,
+    sender_of,
+)
 
 _POSITION_AND_PLAN = {mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mavlink.MAVLINK_MSG_ID_TUNNEL}
 """Messages with a neighbour's position and plan; dropped while the relevance filter ignores their sender."""
@@ -61,12 +67,14 @@ def accepts(
     traffic = {mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE} if config.traffic is not None else set()
     # Sensors of the own system may send on the autopilot link and on the swarm link.
     sensors = distances | traffic
+    detections = DETECTIONS if isinstance(source, FusedSource) else frozenset[int]()
     reported, target_sender = message_of(source), sender_of(source, system, target)
     if link == "autopilot":
         camera = reported if isinstance(source, CameraSource) else None
         return lambda identifier, sender, component: (
             (identifier in wanted and sender == system and component == mavlink.MAV_COMP_ID_AUTOPILOT1)
             or (identifier in sensors and sender == system)
+            or (identifier in detections and sender == system)
             or (identifier == camera and sender == target_sender)
         )
     if link == "target":
@@ -75,7 +83,7 @@ def accepts(
         )
     if link == "swarm":
         # ADSB_VEHICLE may come from any sender on the swarm link, not only from the own system.
-        wanted = wanted | traffic
+        wanted = wanted | traffic | detections
         return lambda identifier, sender, component: (
             identifier in sensors
             if sender == system

@@ -12,11 +12,20 @@ from typing import NamedTuple
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
+from companion.estimation.fused_target import Outgoing
 from companion.values.horizon import Array, Horizon
 from companion.world import View
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame, yaw_to_ned
-from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, Source, Tunnel
+from mavlink_bridge.messages import (
+    CameraFovStatus,
+    CameraTrackingGeo,
+    GlobalPosition,
+    Heartbeat,
+    Message,
+    Source,
+    Tunnel,
+)
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, packed
 from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 from mavlink_bridge.wire.uncertainty import pack as pack_doubt
@@ -86,6 +95,20 @@ class Sharing:
         self.next_due = min(self._next)
         return Shared(autopilot, swarm)
 
+    def detections(self, own: Sequence[Outgoing]) -> list[Message]:
+        """Return the messages that forward ``own`` detections: time of the image and camera, and detection.
+
+        Their time is on the clock of GLOBAL_POSITION_INT. One from before the first message is not sent.
+        """
+        boot, messages = self._boot, list[Message]()
+        if boot is None:
+            return []
+        for time, view, message in own:
+            if time < boot:
+                continue
+            messages += forwarded(self._own, time - boot, view, message)
+        return messages
+
     def _passes(self, kind: int, now: int, period: int) -> bool:
         if now < self._next[kind]:
             return False
@@ -97,6 +120,17 @@ class Sharing:
             raise ValueError("no own state to share")
         yaw = None if view.yaw is None else yaw_to_ned(view.yaw)
         return position_message(self._own, since_boot, self._fleet, view.own.position, view.own.velocity, yaw)
+
+
+def forwarded(
+    own: Source, since_boot: int, view: CameraFovStatus, message: CameraTrackingGeo
+) -> tuple[Message, Message]:
+    """Return the messages by which ``own`` forwards a detection of an image at ``since_boot`` (µs).
+
+    Attitude and angles of view are not forwarded: MAVLink 2 leaves out their zeros at the end.
+    """
+    seen = CameraFovStatus(own, since_boot, view.place, None, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+    return seen, message._replace(source=own)
 
 
 def position_message(

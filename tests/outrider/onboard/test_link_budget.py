@@ -249,3 +249,13 @@ def test_of_the_autopilots_line_it_is_said_too(run: Run, tmp_path: Path, dry_run
     assert ended.status == 2
     assert f"--autopilot {port}: {'what comes back' if dry_run else 'set-points'}" in ended.err
     assert "cannot open the port" in ended.err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_a_radio_has_room_for_forwarded_detections(signed):
+    fused = CompanionConfig.model_validate({"target_source": {"kind": "fused"}})
+    config = FlyConfig(system=1, target=100, origin=HERE, radio=57600, companion=fused).settings
+    more = said(config, signed) - said(RADIO.settings, signed)
+    assert 20.0 < more < 60.0
+    # Nobody tells the target's position on that link.
+    assert FLEET * said(config, signed) <= room(57600)

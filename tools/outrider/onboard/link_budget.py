@@ -9,11 +9,14 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
+from companion.config.target_source import FusedSource
 from companion.flight.readiness import HEALTH, STREAMS
-from companion.telemetry.sharing import onboard_heartbeat
+from companion.telemetry.sharing import forwarded, onboard_heartbeat
 from mavlink_bridge.links.endpoints import BAUD_RATES, Endpoint, Serial
 from mavlink_bridge.messages import (
     Attitude,
+    CameraFovStatus,
+    CameraTrackingGeo,
     EstimatorStatus,
     ExtendedSysState,
     GlobalPosition,
@@ -47,6 +50,12 @@ _SECOND: Final = 1e6
 _ONE: Final = Source(1, 1)
 _STATE: Final = GlobalPosition(_ONE, 1, 1.0, 1.0, 1.0, 1.0, (1.0, 1.0, 1.0), 1.0)
 _PLAN: Final = Tunnel(_ONE, 0, 0, PAYLOAD_TYPE, b"\xff" * 128)
+_DETECTION: Final = forwarded(
+    _ONE,
+    1_000,
+    CameraFovStatus(_ONE, 1, (1.0, 1.0, 1.0), None, (1.0, 0.0, 0.0, 0.0), 1.0, 1.0),
+    CameraTrackingGeo(_ONE, 1, 1.0, 1.0, 1.0, None, 1.0, 1.0, None, 1.0, 1.0, 1.0, 1),
+)
 _EPOCH: Final = (1 << 56) - 1
 _TIMESYNC: Final = Timesync(_ONE, -1, -1)
 _TIMESYNC_US: Final = 1_000_000
@@ -74,15 +83,25 @@ _USB: Final = "ttyACM"
 def said(config: CompanionConfig, signed: bool, vehicles: int = FLEET) -> float:
     """Return the maximum bytes per second of one companion of ``vehicles`` on the swarm link.
 
-    They are states, plans, heartbeats and, in certified mode, all of ``agreed``. MAVLink 2 truncates zeros at
-    the end of a message, so a vehicle at rest sends less.
+    They are states, plans, forwarded detections, heartbeats and, in certified mode, all of ``agreed``.
+    MAVLink 2 truncates zeros at the end of a message, so a vehicle at rest sends less.
     """
     rates = config.rates
     if config.avoidance == "certified":
         plans = agreed(config, signed, vehicles)
     else:
         plans = _size(_PLAN, signed) * _SECOND / rates.plan_us if config.shares_plan else 0.0
-    return _size(_STATE, signed) * _SECOND / rates.state_us + plans + _size(_BEAT, signed)
+    states = _size(_STATE, signed) * _SECOND / rates.state_us
+    return states + plans + _detections(config, signed) + _size(_BEAT, signed)
+
+
+def _detections(config: CompanionConfig, signed: bool) -> float:
+    """Return the maximum bytes per second of forwarded detections."""
+    source = config.target_source
+    if not isinstance(source, FusedSource) or not source.share:
+        return 0.0
+    pair = sum(_size(message, signed) for message in _DETECTION)
+    return pair * _SECOND / config.rates.detection_us
 
 
 def agreed(config: CompanionConfig, signed: bool, vehicles: int) -> float:

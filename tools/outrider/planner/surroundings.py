@@ -10,7 +10,7 @@ from companion.config import CompanionConfig
 from companion.estimation.tracks import State
 from companion.obstacles.static import Axes, FixedObstacles
 from companion.values.horizon import Array
-from companion.values.mates import Mates
+from companion.values.mates import Mates, Sight
 from companion.values.obstacles import Obstacles
 from companion.world import View, reach
 from mavlink_bridge.frames import LocalFrame
@@ -107,6 +107,10 @@ class Surroundings:
         found = self._planning(now)
         places = np.array([self._here(one, now) for one in found]).reshape(-1, 3)
         return Mates(tuple(one.id for one in found), places)
+
+    def sight(self, now: int, ahead: float) -> Sight:
+        """Return nothing: the caller gives the target's state, not detections."""
+        return Sight()
 
     def mate_ids(self, now: int) -> frozenset[int]:
         """Return the ids of the neighbours that share a plan which is not too old."""

@@ -55,6 +55,12 @@ TERMS = {
     "estimate_error_m": Term(
         "error of the estimate", "m", "between the autopilot's estimated and true position"
     ),
+    "target_error_m": Term("error of the target's estimate", "m", "fused estimates against the truth"),
+    "nees": Term("NEES of the target", "", "squared error over covariance; 3 on average if that is right"),
+    "information_ratio": Term("information ratio", "", "tr Σ·a/2: 1 for the best bearings"),
+    "anisotropy": Term("anisotropy", "", "|s|/Σw of the bearings: 0 for the best"),
+    "seen_by": Term("target seen by", "", "vehicles whose detections arrive"),
+    "detections": Term("detections", "", "of all companions together"),
     "plan_ms": Term("CPU time of a plan", "ms", "neighbours to plan"),
     "plans": Term("plans", "", "made while the clock ran"),
     "solver_failures": Term("solver failures", "", "the old plan is held, then the vehicle brakes"),

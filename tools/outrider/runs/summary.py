@@ -10,9 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.config.target_source import FusedSource
 from outrider.runs.crash_check import first_fall
 from outrider.runs.formation_error import standoff
+from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
+from outrider.runs.perception import bearings_quality, counts, estimates
 
 Array = NDArray[np.float64]
 Value = float | int | str | bool | None | dict[str, float] | dict[str, float | None] | dict[str, int]
@@ -93,6 +96,7 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
             np.linalg.norm(samples.position + samples.estimate_error - samples.reference, axis=-1), 95, "max"
         ),
         "estimate_error_m": _percentiles(np.linalg.norm(samples.estimate_error, axis=-1), 95, "max"),
+        **_perception(flight, samples),
         "messages": flight.messages._asdict(),
         "deadline_misses": None if late is None else late.misses,
         "deadline_steps": None if late is None else late.deadlines,
@@ -105,6 +109,29 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "cpu_s": round(cost.cpu, 3),
         "real_time_factor": round(simulated / cost.wall, 2) if cost.wall > 0 else 0.0,
         "run_dir": None if run_dir is None else str(run_dir),
+    }
+
+
+def _perception(flight: Outcome, samples: Samples) -> dict[str, Value]:
+    """Return the figures of fused detections and of the bearings; null without ``target_source: fused``."""
+    scenario = flight.scenario
+    if not isinstance(scenario.companion.target_source, FusedSource):
+        names = "target_error_m", "nees", "information_ratio", "anisotropy", "seen_by", "detections"
+        return dict.fromkeys(names)
+    known = estimates(flight, samples)
+    shares, ratios = bearings_quality(scenario, samples)
+    nees = known.nees
+    seen = known.seen_by
+    return {
+        "target_error_m": _percentiles(np.linalg.norm(known.errors, axis=-1), 50, 95, "max"),
+        "nees": round(float(nees.mean()), 3) if len(nees) else None,
+        "information_ratio": _percentiles(ratios, 50, 95),
+        "anisotropy": _percentiles(shares, 50, 95),
+        "seen_by": {
+            "p50": float(np.median(seen)) if len(seen) else None,
+            "min": float(seen.min()) if len(seen) else None,
+        },
+        "detections": counts(flight)._asdict(),
     }
 
 

@@ -33,9 +33,10 @@ class Radio(Settings):
     state_us: int
     plan_us: int
     plan_stale_us: int
+    detection_us: int
 
 
-RADIOS = {57600: Radio(state_us=400_000, plan_us=540_000, plan_stale_us=1_200_000)}
+RADIOS = {57600: Radio(state_us=400_000, plan_us=540_000, plan_stale_us=1_200_000, detection_us=3_000_000)}
 """Rates by the baud of a radio that eight vehicles and their target share, signed or not (``link_budget``).
 
 A receiver that misses one plan continues with the previous plan, which is 1.6 s long.
@@ -95,7 +96,13 @@ class FlyConfig(Settings):
         if self.radio is None:
             return self.companion
         radio, companion = RADIOS[self.radio], self.companion
-        rates = companion.rates.model_copy(update={"state_us": radio.state_us, "plan_us": radio.plan_us})
+        rates = companion.rates.model_copy(
+            update={
+                "state_us": radio.state_us,
+                "plan_us": radio.plan_us,
+                "detection_us": max(radio.detection_us, companion.rates.detection_us),
+            }
+        )
         guard = companion.guard.model_copy(update={"plan_stale_us": radio.plan_stale_us})
         return companion.model_copy(update={"rates": rates, "guard": guard})
 

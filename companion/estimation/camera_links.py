@@ -1,0 +1,149 @@
+"""Messages of cameras, matched to detections: those of the own camera, and those that neighbours forward.
+
+CAMERA_FOV_STATUS (271) has the time of the image, on the clock of the vehicle's autopilot, and of a forwarded
+one on that of the vehicle's companion. It comes before the detection, in the same datagram. Without it the
+image is ``latency_us`` old, and the camera is where the vehicle was.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from math import atan2, hypot, sqrt
+
+import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
+
+from companion.config.target_source import FusedSource
+from companion.estimation.fused_target import FusedTarget
+from companion.estimation.tracks import State
+from companion.values.horizon import Array
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo, CameraTrackingImage, Source
+from mavlink_bridge.pinhole import Extent, Pinhole, covariance, foot, matrix, rotated, upward
+
+CAMERA_MESSAGES = (CameraFovStatus, CameraTrackingGeo, CameraTrackingImage)
+CameraMessage = CameraFovStatus | CameraTrackingGeo | CameraTrackingImage
+
+_REMEMBERED = 64
+"""Number of stamps of a sender by which a repeated detection is recognised."""
+_WIDTH = 1000
+"""Width (pixels) of the image in which places in an image are expressed."""
+_FORWARD = 1.0, 0.0, 0.0, 0.0
+
+
+class CameraLinks:
+    """Receives the messages of cameras and gives detections to ``target``."""
+
+    def __init__(self, source: FusedSource, fleet: FleetFrame, target: FusedTarget) -> None:
+        self._source, self._fleet, self._target = source, fleet, target
+        self._views: dict[Source, tuple[int, CameraFovStatus]] = {}
+        self._stamps: dict[Source, deque[int]] = {}
+
+    def own(
+        self, now: int, message: CameraMessage, when: Callable[[int], int | None], vehicle: State | None
+    ) -> None:
+        """Receive a message of the own camera at ``now`` (µs).
+
+        ``when`` converts a stamp of the autopilot's clock to a time (µs), and returns None for one from the
+        future; ``vehicle``: own state at ``now``.
+        """
+        if isinstance(message, CameraFovStatus):
+            self._views[message.source] = now, message
+            return
+        view = self._view(now, message.source)
+        if isinstance(message, CameraTrackingImage):
+            found = None if view is None else self._projected(view, message)
+            if found is None:
+                self._target.drop()
+                return
+            message = found
+        time = now - self._source.latency_us
+        if view is not None:
+            taken = when(view.time_boot)
+            if taken is None:
+                self._target.drop()
+                return
+            time = taken
+        elif vehicle is not None:
+            place = vehicle.position - 1e-6 * (now - time) * vehicle.velocity
+            view = CameraFovStatus(
+                message.source, 0, self._fleet.to_geodetic(place), None, _FORWARD, 0.0, 0.0
+            )
+        self._give(now, time, view, message)
+
+    def forwarded(self, now: int, message: CameraMessage, when: Callable[[int], int | None]) -> None:
+        """Receive a message that a neighbour forwards, at ``now`` (µs).
+
+        ``when`` converts a stamp of its clock to a time (µs), and returns None if the neighbour is not of the
+        fleet. A detection without the time of its image, or a repeated one, is dropped.
+        """
+        if isinstance(message, CameraFovStatus):
+            self._views[message.source] = now, message
+            return
+        view = self._view(now, message.source)
+        time = None if view is None else when(view.time_boot)
+        if time is None or view is None or isinstance(message, CameraTrackingImage):
+            self._target.drop()
+            return
+        stamps = self._stamps.setdefault(message.source, deque(maxlen=_REMEMBERED))
+        if view.time_boot in stamps:
+            self._target.drop()
+            return
+        stamps.append(view.time_boot)
+        self._give(now, time, view, message)
+
+    def _view(self, now: int, source: Source) -> CameraFovStatus | None:
+        """Return the camera's field of view that arrived with the message at ``now`` (µs)."""
+        received, view = self._views.get(source, (0, None))
+        return view if received == now else None
+
+    def _give(self, now: int, time: int, view: CameraFovStatus | None, message: CameraTrackingGeo) -> None:
+        camera: Array | None = None
+        if view is not None and view.place is not None:
+            camera = np.array(self._fleet.to_east_north_up(*view.place))
+        self._target.receive(now, time, camera, view, message)
+
+    def _projected(self, view: CameraFovStatus, message: CameraTrackingImage) -> CameraTrackingGeo | None:
+        """Return the place of an object of the configured height from its rectangle in the image.
+
+        Returns None if it has none, or shows no object in front of the camera.
+        """
+        source, rectangle, place = self._source, message.rectangle, view.place
+        fields = view.horizontal_field, view.vertical_field
+        tracks = message.status == mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE
+        if rectangle is None or place is None or not tracks or not all(0.0 < one < 3.0 for one in fields):
+            return None
+        height = round(_WIDTH * np.tan(0.5 * fields[1]) / np.tan(0.5 * fields[0]))
+        camera = Pinhole.of_field(_WIDTH, max(height, 1), fields[0])
+        left, top, right, bottom = rectangle
+        seen = Extent(0.5 * (left + right) * _WIDTH, top * height, bottom * height)
+        up = upward(view.attitude)
+        found = foot(camera, seen, up, source.height)
+        if found is None:
+            return None
+        north, east, down = rotated(view.attitude, found)
+        level = hypot(north, east)
+        if level == 0.0:
+            return None
+        turn = matrix(view.attitude)
+        errors = (
+            turn
+            @ covariance(camera, seen, up, source.height, source.sigma_row * height, source.sigma_height)
+            @ turn.T
+        )
+        across = np.array((-east / level, north / level, 0.0))
+        start = np.array(self._fleet.to_east_north_up(*place))
+        where = self._fleet.to_geodetic(start + np.array([east, north, -down]))
+        return CameraTrackingGeo(
+            message.source,
+            message.status,
+            *where,
+            None,
+            horizontal_accuracy=sqrt(errors[0, 0] + errors[1, 1]),
+            vertical_accuracy=sqrt(errors[2, 2]),
+            distance=hypot(level, down),
+            heading=atan2(east, north),
+            heading_accuracy=sqrt(float(across @ errors @ across)) / level,
+            device=message.device,
+        )

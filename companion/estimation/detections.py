@@ -1,0 +1,93 @@
+"""Detections of a target by cameras, as the fusion filter takes them.
+
+A detection says where the target is: along the ray with σ_s, which a known height of the target makes large,
+and across it with σ_t. CAMERA_TRACKING_GEO_STATUS gives the horizontal accuracy h = √(σ_along² + σ_t²) and
+the vertical one v; with the elevation β of the ray σ_along = σ_s cos β and v² = σ_s² sin² β + σ_t² cos² β, so
+σ_s² = h² + v² − 2σ_t². A message with a velocity is an estimate: a tracker has filtered it.
+"""
+
+from __future__ import annotations
+
+from math import hypot, inf, radians
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.config.target_source import FusedSource
+from companion.estimation.fusion_filter import FIELDS
+from companion.values.horizon import Array
+from mavlink_bridge.messages import CameraTrackingGeo
+
+_MAX_SIGMA_M, _MAX_BEARING_RAD, _MAX_DISTANCE_M = 100.0, 0.5, 2000.0
+"""Accuracies and distances beyond these are absurd."""
+_MIN_SIGMA_M = 0.01
+"""No camera is believed to be more accurate (m)."""
+
+
+class Detection(NamedTuple):
+    """Detection of the target by the camera of ``vehicle`` in an image taken at ``time`` (µs).
+
+    ``fields`` (FIELDS,): as ``fusion_filter`` takes them. ``estimate``: whether it is an estimate
+    that may have detections in common with others. ``weight`` (1/m²): w_k of the camera at this distance,
+    with the errors of the vehicle. ``message``: as received.
+    """
+
+    vehicle: int
+    time: int
+    fields: Array
+    estimate: bool
+    weight: float
+    message: CameraTrackingGeo
+
+
+def detection(
+    config: FusedSource, vehicle: int, time: int, place: Array, camera: Array, message: CameraTrackingGeo
+) -> Detection | None:
+    """Return the detection in ``message`` of a camera at ``camera`` (3,); ``place`` (3,): the target's, m.
+
+    Returns None for one whose accuracies or distance are absurd.
+    """
+    ray = place - camera
+    distance = float(np.sqrt(ray @ ray))
+    if not 1e-3 < distance <= _MAX_DISTANCE_M:
+        return None
+    across, along = _accuracies(config, distance, message)
+    if not (0.0 < across <= _MAX_SIGMA_M and 0.0 < along <= _MAX_SIGMA_M):
+        return None
+    errors = config.errors
+    ray = ray / distance
+    level = hypot(ray[0], ray[1])
+    # Straight below the camera the yaw moves nothing.
+    left = np.array([-ray[1], ray[0], 0.0])
+    up = np.cross(ray, left / level) if level > 1e-6 else np.array([1.0, 0.0, 0.0])
+    white = errors.sigma_white**2
+    covariance = across**2 * np.eye(3) + (along**2 - across**2) * np.outer(ray, ray)
+    fields = np.concatenate([place, covariance.ravel(), left, up, camera, [distance]])
+    estimate = message.velocity_ned is not None
+    if fields.shape != (FIELDS,) or not np.isfinite(fields).all():
+        return None
+    common = errors.sigma_horizontal**2 + (radians(errors.sigma_yaw_deg) * distance * level) ** 2
+    sideways = across**2 + white + common
+    lengthways = (along * level) ** 2 + white + errors.sigma_horizontal**2
+    weight = 0.5 * (1.0 / sideways - 1.0 / lengthways)
+    return Detection(vehicle, time, fields, estimate, weight, message)
+
+
+def _accuracies(config: FusedSource, distance: float, message: CameraTrackingGeo) -> tuple[float, float]:
+    """Return σ across and along the ray, m; ∞ for absurd ones.
+
+    What the camera does not say is as configured.
+    """
+    heading = message.heading_accuracy
+    horizontal, vertical = message.horizontal_accuracy, message.vertical_accuracy
+    if heading is not None and not 0.0 < heading <= _MAX_BEARING_RAD:
+        return inf, inf
+    across = max(distance * (radians(config.sigma_bearing_deg) if heading is None else heading), _MIN_SIGMA_M)
+    if horizontal is None or vertical is None:
+        return across, max(distance * config.sigma_range_share, across)
+    if not (0.0 < horizontal <= _MAX_SIGMA_M and 0.0 < vertical <= _MAX_SIGMA_M):
+        return inf, inf
+    if heading is None:
+        across = max(min(across, horizontal, vertical), _MIN_SIGMA_M)
+    square = horizontal**2 + vertical**2 - 2.0 * across**2
+    return across, max(float(np.sqrt(max(square, 0.0))), across)

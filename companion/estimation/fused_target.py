@@ -1,0 +1,184 @@
+"""Target estimated from the detections of all cameras of a fleet.
+
+A detection counts if it is finite, of plausible accuracy, of a vehicle of the fleet, of the target, and not
+from the future; others are counted and dropped.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
+
+from companion.config import CompanionConfig
+from companion.config.target_source import FusedSource
+from companion.estimation.detections import Detection, detection
+from companion.estimation.fusion import Fusion
+from companion.estimation.fusion_filter import worst_sigma
+from companion.estimation.fusion_log import Counts, FusionLog, FusionTally
+from companion.estimation.tracks import State
+from companion.values.horizon import Array
+from companion.values.mates import Sight
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo
+
+_MAX_DISTANCE_M = 1e5
+_RECENT_US, _SEEN_US = 2_000_000, 500_000
+"""Time (µs) over which the cameras' weights are measured, and in which a detection counts as seeing now."""
+
+
+class Outgoing(NamedTuple):
+    """Own detection to forward: time (µs) of the image, the camera's field of view, and the detection."""
+
+    time: int
+    view: CameraFovStatus
+    message: CameraTrackingGeo
+
+
+_ENOUGH = 0.5
+"""A camera with this share of the detections of the best one counts in full, one with fewer in proportion."""
+
+
+class FusedTarget:
+    """Estimate of the target by the companion of ``system``; it is used as ``Target`` is."""
+
+    def __init__(self, config: CompanionConfig, source: FusedSource, system: int, fleet: FleetFrame) -> None:
+        self._config, self._source, self._system, self._fleet = config, source, system, fleet
+        self._fusion = Fusion(source, config.target.rewind_us)
+        self._own = self._others = self._invalid = 0
+        self._waiting: Outgoing | None = None
+        self._next = 0
+        self._sent = 0
+        self._log = FusionLog()
+
+    @property
+    def counts(self) -> Counts:
+        """Numbers of detections so far."""
+        fusion = self._fusion
+        numbers = self._own, self._others, self._sent, fusion.used, fusion.refused, fusion.late
+        return Counts(*numbers, self._invalid)
+
+    @property
+    def tally(self) -> FusionTally:
+        """Counters and log for the summary."""
+        return self._log.tally(self.counts)
+
+    def shed(self) -> None:
+        """Empty the log."""
+        self._log.clear()
+
+    def record(self, now: int) -> None:
+        """Add a row to the log if one is due at ``now`` (µs)."""
+        if not self._log.due(now):
+            return
+        known = self._fusion.at(now, self._config.target.extrapolate_us)
+        if known is not None:
+            seen_by = len(self._fusion.recent(now - _SEEN_US - self._source.latency_us))
+            self._log.add(now, known.position, known.covariance, seen_by)
+
+    @property
+    def refused(self) -> int:
+        """Number of detections that were dropped, or refused by the gate."""
+        return self._invalid + self._fusion.late + self._fusion.refused
+
+    def drop(self) -> None:
+        """Count a detection that cannot be used."""
+        self._invalid += 1
+
+    def receive(
+        self,
+        now: int,
+        time: int,
+        camera: Array | None,
+        view: CameraFovStatus | None,
+        message: CameraTrackingGeo,
+    ) -> bool:
+        """Receive a detection of an image taken at ``time`` (µs) by a camera at ``camera`` (3,), m.
+
+        ``view``: of the same image. Return whether the detection counts.
+        """
+        found = self._detection(time, camera, message)
+        if found is None:
+            self._invalid += 1
+            return False
+        if not self._fusion.put(found):
+            return False
+        if message.source.system != self._system:
+            self._others += 1
+            return True
+        self._own += 1
+        if self._source.share and view is not None:
+            self._waiting = Outgoing(time, view, message)
+        return True
+
+    def outgoing(self, now: int) -> list[Outgoing]:
+        """Return the own detections to forward at ``now`` (µs): the newest, if one is due."""
+        if self._waiting is None or now < self._next:
+            return []
+        waiting, self._waiting = self._waiting, None
+        period = self._config.rates.detection_us
+        # A camera of the same period is not slowed down by jitter of its messages.
+        self._next = max(self._next, now - period // 2) + period
+        self._sent += 1
+        return [waiting]
+
+    def at(self, now: int) -> State | None:
+        """Return the target's state at ``now`` (µs); None before the first detection and when stale."""
+        return self.fresh(self.last(now))
+
+    def last(self, now: int) -> State | None:
+        """Return the last known state at ``now`` (µs), however old; None before the first detection."""
+        known = self._fusion.at(now, self._config.target.extrapolate_us)
+        if known is None:
+            return None
+        return State(known.position, known.velocity, now - known.time, worst_sigma(known.covariance))
+
+    def fresh(self, state: State | None) -> State | None:
+        """Return ``state``, or None if it is older than ``guard.target_stale_us``."""
+        old = state is not None and state.age > self._config.guard.target_stale_us
+        return None if old else state
+
+    def age(self, now: int) -> int | None:
+        """Return the age (µs) of the last image that counts; None before the first."""
+        time = self._fusion.time
+        return None if time is None else now - time
+
+    def covariance(self, now: int) -> Array | None:
+        """Return the covariance (3, 3) of the target's position at ``now`` (µs); None before the first."""
+        known = self._fusion.at(now, self._config.target.extrapolate_us)
+        return None if known is None else known.covariance
+
+    def sight(self, now: int, ahead: float) -> Sight:
+        """Return what is known beside the state; the horizon ends ``ahead`` (s) after ``now`` (µs)."""
+        recent = self._fusion.recent(now - _RECENT_US - self._source.latency_us)
+        if not recent:
+            return Sight()
+        weights = {}
+        for system, found in recent.items():
+            # Messages of neighbours are lost, none of the own: a camera is compared with others.
+            others = [len(one) for other, one in recent.items() if other not in (system, self._system)]
+            seen = min(1.0, len(found) / max(_ENOUGH * max(others, default=0), 1.0))
+            weights[system] = seen * sum(found) / len(found)
+        covariance = self.covariance(now + round(1e6 * ahead))
+        prior = 0j
+        if covariance is not None:
+            information = np.linalg.inv(covariance[:2, :2])
+            # −½(λ₁ − λ₂) e^{2iφ₁} of the information in the plane.
+            prior = -complex(0.5 * (information[0, 0] - information[1, 1]), information[0, 1])
+        return Sight(MappingProxyType(weights), prior)
+
+    def _detection(self, time: int, camera: Array | None, message: CameraTrackingGeo) -> Detection | None:
+        source = self._source
+        tracks = message.status == mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE
+        other = source.device is not None and message.device != source.device
+        system = message.source.system
+        strange = bool(source.vehicles) and system not in source.vehicles and system != self._system
+        if camera is None or not tracks or other or strange:
+            return None
+        place = np.array(self._fleet.to_east_north_up(message.latitude, message.longitude, message.altitude))
+        if not (isfinite(float(place.sum())) and float(place @ place) <= _MAX_DISTANCE_M**2):
+            return None
+        return detection(source, system, time, place, camera, message)

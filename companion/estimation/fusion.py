@@ -1,0 +1,275 @@
+"""Fusion of detections: inserted at the times of their images, gated, and extrapolated.
+
+Detections are kept in the order of their images, each with the filter's state after it. New ones are
+processed together when a state is needed: from the earliest on, all later ones are processed again. So the
+result does not depend on the order of arrival. A place that contradicts the state is refused; if nothing
+passes for a while and the refused ones agree with each other, the filter begins anew with them.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.config.target_source import FusedSource, OwnErrors
+from companion.estimation.detections import Detection
+from companion.estimation.fusion_filter import FIELDS, PER_VEHICLE, TARGET, replay
+from companion.values.horizon import Array
+
+_FIRST_SIGMA_M, _FIRST_SIGMA_M_S = 100.0, 2.0
+"""σ of place and velocity before the first detection."""
+_UNIT = np.eye(3)
+_CAPACITY = 512
+"""Largest number of detections that are kept."""
+_WINDOW_SHARE = 2
+"""Detections of at least the window, and of this many windows at most, are kept."""
+_RESTART_US, _WITNESSES, _AGREE_M, _AGREE_M_S = 1_000_000, 3, 2.0, 3.0
+"""After this time without a passing detection so many refused ones restart the filter that agree.
+
+They agree if the places differ by at most a length plus a speed times the time between.
+"""
+
+
+class Belief(NamedTuple):
+    """What is known of the target: ``position`` (3,) m, ``velocity`` (3,) m/s, fleet-local ENU.
+
+    ``covariance`` (3, 3): of the position; ``time`` (µs): of the image of the last detection that passed.
+    """
+
+    time: int
+    position: Array
+    velocity: Array
+    covariance: Array
+
+
+class Fusion:
+    """Filter of all detections; times are the companion's own, in µs.
+
+    ``window``: µs by which a detection may be late. ``late``: number of detections that were later.
+    """
+
+    def __init__(self, config: FusedSource, window: int) -> None:
+        self._window = window
+        self._noise = _noise(config)
+        self._density = config.sigma_acceleration**2
+        self._variances = self._noise[2:12:2]
+        self._slots: dict[int, int] = {}
+        self._detections: list[Detection] = []
+        self._pending: list[Detection] = []
+        self._times = np.zeros(_CAPACITY, dtype=np.int64)
+        self._rows = np.zeros(_CAPACITY, dtype=np.int64)
+        self._data = np.zeros((_CAPACITY, FIELDS))
+        self._used = np.zeros(_CAPACITY, dtype=bool)
+        self._nis = np.zeros(_CAPACITY)
+        self._began: int | None = None
+        self._passed: int | None = None
+        self._x0, self._P0, self._means0 = np.zeros(TARGET), np.zeros((TARGET, TARGET)), np.zeros(0)
+        self._allocate()
+        self.late = self.restarts = 0
+        self._forgotten_used = self._forgotten_refused = 0
+
+    def put(self, detection: Detection) -> bool:
+        """Add a detection; return False if it is older than the window."""
+        if self._began is not None and detection.time < self._latest - self._window:
+            self.late += 1
+            return False
+        if self._began is None:
+            self._began = detection.time
+            self._start(detection)
+        elif not self._detections and not self._pending:
+            self._began = min(self._began, detection.time)
+        self._pending.append(detection)
+        return True
+
+    @property
+    def used(self) -> int:
+        """Number of detections that passed the gate, of those processed so far."""
+        self._process()
+        return self._forgotten_used + int(np.count_nonzero(self._used[: len(self._detections)]))
+
+    @property
+    def refused(self) -> int:
+        """Number of detections that the gate refused."""
+        self._process()
+        count = len(self._detections)
+        return self._forgotten_refused + count - int(np.count_nonzero(self._used[:count]))
+
+    @property
+    def time(self) -> int | None:
+        """Time (µs) of the image of the last detection that passed; None before the first."""
+        self._process()
+        return self._passed
+
+    def at(self, time: int, longest: int) -> Belief | None:
+        """Return what is known at ``time`` (µs); None before the first detection.
+
+        It moves on from the last detection for ``longest`` µs and then rests; the covariance grows on.
+        """
+        self._process()
+        count, passed = len(self._detections), self.time
+        if not count or passed is None:
+            return None
+        x, P = self._states[count - 1], self._covariances[count - 1]
+        # Before the last detection, the state is that at it.
+        elapsed = max(time - int(self._times[count - 1]), 0)
+        dt, moving = 1e-6 * elapsed, 1e-6 * min(elapsed, longest)
+        velocity = x[3:6].copy() if elapsed <= longest else np.zeros(3)
+        across = P[:3, 3:6]
+        covariance = P[:3, :3] + dt * (across + across.T) + dt * dt * P[3:6, 3:6]
+        covariance += self._density * dt**3 / 3.0 * _UNIT
+        return Belief(passed, x[:3] + moving * x[3:6], velocity, covariance)
+
+    def recent(self, since: int) -> dict[int, list[float]]:
+        """Return w_k of the detections of images from ``since`` (µs) on that passed, by vehicle."""
+        self._process()
+        found: dict[int, list[float]] = {}
+        first = int(np.searchsorted(self._times[: len(self._detections)], since))
+        for row in range(first, len(self._detections)):
+            if self._used[row]:
+                one = self._detections[row]
+                found.setdefault(one.vehicle, []).append(one.weight)
+        return found
+
+    @property
+    def innovations(self) -> Array:
+        """d² (N,) of the detections in the window that passed."""
+        self._process()
+        count = len(self._detections)
+        return self._nis[:count][self._used[:count]].copy()
+
+    @property
+    def _latest(self) -> int:
+        times = [one.time for one in self._pending]
+        if self._detections:
+            times.append(int(self._times[len(self._detections) - 1]))
+        return max(times, default=-(1 << 62))
+
+    def _start(self, first: Detection) -> None:
+        """Begin with nothing known but that the target is about where ``first`` places it."""
+        self._x0 = np.zeros(len(self._x0))
+        self._x0[:3] = first.fields[:3]
+        self._P0 = self._prior()
+        self._means0 = np.zeros(len(self._slots))
+        self._passed = None
+
+    def _prior(self) -> Array:
+        errors = np.tile(self._variances, len(self._slots))
+        place, speed = [_FIRST_SIGMA_M**2] * 3, [_FIRST_SIGMA_M_S**2] * 3
+        return np.diag(np.concatenate([place, speed, errors]))
+
+    def _allocate(self) -> None:
+        n, vehicles = TARGET + PER_VEHICLE * len(self._slots), len(self._slots)
+        self._states, self._covariances = np.zeros((_CAPACITY, n)), np.zeros((_CAPACITY, n, n))
+        self._means = np.zeros((_CAPACITY, vehicles))
+        x0, P0, means0 = self._x0, self._P0, self._means0
+        self._x0, self._P0, self._means0 = np.zeros(n), self._prior(), np.zeros(vehicles)
+        self._x0[: len(x0)], self._P0[: len(x0), : len(x0)], self._means0[: len(means0)] = x0, P0, means0
+
+    def _process(self) -> None:
+        """Process the pending detections, and all with later images again."""
+        if not self._pending or self._began is None:
+            return
+        pending, self._pending = self._pending, []
+        new = {one.vehicle for one in pending if not one.estimate} - self._slots.keys()
+        first = len(self._detections)
+        for vehicle in sorted(new):
+            self._slots[vehicle] = len(self._slots)
+        if new:
+            self._allocate()
+            first = 0
+        for one in sorted(pending, key=_order):
+            first = min(first, self._insert(one))
+        count = len(self._detections)
+        replay(
+            self._times, self._rows, self._data, first, count, self._began,
+            self._x0, self._P0, self._means0, self._noise,
+            self._states, self._covariances, self._means, self._used, self._nis,
+        )  # fmt: skip
+        passed = np.flatnonzero(self._used[:count])
+        if len(passed):
+            self._passed = int(self._times[passed[-1]])
+        self._restart_if_wrong()
+        self._forget()
+
+    def _insert(self, one: Detection) -> int:
+        """Insert a detection in the order of images; return its index."""
+        if len(self._detections) == _CAPACITY:
+            self._drop(_CAPACITY // 2)
+        count = len(self._detections)
+        place = bisect_right(self._detections, _order(one), key=_order)
+        for column in (self._times, self._rows, self._data):
+            column[place + 1 : count + 1] = column[place:count].copy()
+        self._detections.insert(place, one)
+        self._times[place] = one.time
+        self._rows[place] = -1 if one.estimate else self._slots[one.vehicle]
+        self._data[place] = one.fields
+        return place
+
+    def _forget(self) -> None:
+        """Drop what is older than the window once it is twice as much: nothing is inserted there any more."""
+        count = len(self._detections)
+        if count and self._times[0] < self._times[count - 1] - _WINDOW_SHARE * self._window:
+            old = int(np.searchsorted(self._times[:count], self._times[count - 1] - self._window))
+            self._drop(min(old, count - 1))
+
+    def _drop(self, old: int) -> None:
+        """Drop the first ``old`` detections; the filter begins with the state after them."""
+        if old <= 0:
+            return
+        count, used = len(self._detections), int(np.count_nonzero(self._used[:old]))
+        self._forgotten_used += used
+        self._forgotten_refused += old - used
+        self._began = int(self._times[old - 1])
+        self._x0, self._P0 = self._states[old - 1].copy(), self._covariances[old - 1].copy()
+        self._means0 = self._means[old - 1].copy()
+        for column in (self._times, self._rows, self._data, self._states, self._covariances, self._means):
+            column[: count - old] = column[old:count].copy()
+        for flags in (self._used, self._nis):
+            flags[: count - old] = flags[old:count].copy()
+        del self._detections[:old]
+
+    def _restart_if_wrong(self) -> None:
+        """Begin anew with refused detections that agree, if nothing has passed for a while."""
+        count = len(self._detections)
+        last = int(self._times[count - 1])
+        recent = range(int(np.searchsorted(self._times[:count], last - _RESTART_US)), count)
+        if any(self._used[row] for row in recent):
+            return
+        one = self._detections[count - 1]
+        agreeing = [row for row in recent if self._agree(self._detections[row], one)]
+        if len(agreeing) < _WITNESSES:
+            return
+        self.restarts += 1
+        kept = [self._detections[row] for row in agreeing]
+        self._drop(count - 1)
+        self._forgotten_refused += 1
+        self._detections.clear()
+        self._began = kept[0].time
+        self._start(kept[0])
+        self._forgotten_refused -= len(kept)
+        self._pending = kept
+        self._process()
+
+    @staticmethod
+    def _agree(one: Detection, other: Detection) -> bool:
+        apart = float(np.linalg.norm(one.fields[:3] - other.fields[:3]))
+        return apart <= _AGREE_M + _AGREE_M_S * 1e-6 * abs(one.time - other.time)
+
+
+def _order(one: Detection) -> tuple[int, int]:
+    """Return the key by which detections are ordered: the image's time, then the vehicle."""
+    return one.time, one.vehicle
+
+
+def _noise(config: FusedSource) -> Array:
+    """Return the vector ``noise`` of ``replay``."""
+    errors: OwnErrors = config.errors
+    horizontal, vertical = errors.sigma_horizontal**2, errors.sigma_vertical**2
+    position, yaw = 1.0 / errors.position_s, radians(errors.sigma_yaw_deg) ** 2
+    tilt = radians(errors.sigma_tilt_deg) ** 2
+    parts = [horizontal, position, horizontal, position, vertical, position]
+    parts += [yaw, 1.0 / errors.yaw_s, tilt, 1.0 / errors.tilt_s]
+    return np.array([config.sigma_acceleration**2, config.gate, *parts, errors.sigma_white**2])

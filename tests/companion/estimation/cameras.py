@@ -1,0 +1,117 @@
+"""Synthetic cameras: vehicles with errors of their own that last, and detections with independent ones."""
+
+from __future__ import annotations
+
+from math import atan2, hypot, radians
+
+import numpy as np
+
+from companion.config.target_source import FusedSource, OwnErrors
+from companion.estimation.detections import Detection, detection
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import CameraTrackingGeo, Source
+from outrider.scenarios.companion_settings import own_errors
+from sitl.estimation.profiles import PROFILES, ProfileName
+
+FLEET = FleetFrame(47.397742, 8.545594, 488.0)
+START = 1_767_225_600_000_000
+ALONG, ACROSS_DEG = 0.08, 0.12
+"""σ along the ray as a share of the distance, and across it."""
+
+
+def source_of(profile: ProfileName, acceleration: float = 1.0) -> FusedSource:
+    return FusedSource(
+        kind="fused", own_errors=own_errors(PROFILES[profile]), sigma_acceleration=acceleration
+    )
+
+
+def message(system: int, place, camera, along: float | None = None) -> CameraTrackingGeo:
+    """CAMERA_TRACKING_GEO_STATUS of a place, with the accuracies that the SITL's camera would state."""
+    ray = np.asarray(place, dtype=float) - camera
+    distance = float(np.linalg.norm(ray))
+    level = hypot(ray[0], ray[1])
+    along = ALONG * distance if along is None else along
+    across = radians(ACROSS_DEG) * distance
+    cos, sin = level / distance, abs(ray[2]) / distance
+    return CameraTrackingGeo(
+        Source(system, 100),
+        1,
+        *FLEET.to_geodetic(np.asarray(place, dtype=float)),
+        None,
+        horizontal_accuracy=hypot(hypot(along * cos, across * sin), across),
+        vertical_accuracy=hypot(along * sin, across * cos),
+        distance=distance,
+        heading=atan2(ray[0], ray[1]),
+        heading_accuracy=radians(ACROSS_DEG),
+    )
+
+
+class Process:
+    """First-order Gauss–Markov process of ``size`` numbers with standard deviations ``sigma``."""
+
+    def __init__(self, random: np.random.Generator, sigma, seconds: float) -> None:
+        self._random, self._sigma, self._seconds = random, np.asarray(sigma, dtype=float), seconds
+        self.value = self._sigma * random.normal(size=self._sigma.shape)
+
+    def step(self, dt: float) -> None:
+        keep = np.exp(-dt / self._seconds)
+        noise = self._random.normal(size=self._sigma.shape)
+        self.value = keep * self.value + np.sqrt(1.0 - keep**2) * self._sigma * noise
+
+
+class Vehicle:
+    """Camera of ``system`` that circles a point at 6 m and 5 m above it."""
+
+    def __init__(self, system: int, bearing: float, source: FusedSource, random: np.random.Generator) -> None:
+        errors: OwnErrors = source.errors
+        self.system, self._bearing, self._source, self._random = system, bearing, source, random
+        horizontal, vertical = errors.sigma_horizontal, errors.sigma_vertical
+        self._position = Process(random, [horizontal, horizontal, vertical], errors.position_s)
+        self._yaw = Process(random, radians(errors.sigma_yaw_deg), errors.yaw_s)
+        self._tilt = Process(random, radians(errors.sigma_tilt_deg), errors.tilt_s)
+
+    def step(self, dt: float) -> None:
+        for process in (self._position, self._yaw, self._tilt):
+            process.step(dt)
+
+    def sees(self, time: int, target) -> Detection:
+        """What it detects of a target (3,), m."""
+        camera = np.array([6.0 * np.cos(self._bearing), 6.0 * np.sin(self._bearing), 5.0])
+        ray = np.asarray(target) - camera
+        distance = float(np.linalg.norm(ray))
+        level = hypot(ray[0], ray[1])
+        normal = self._random.normal(size=3)
+        across = radians(ACROSS_DEG)
+        heading = atan2(ray[1], ray[0]) + across * normal[0] * distance / level + float(self._yaw.value)
+        elevation = atan2(ray[2], level) + across * normal[1] + float(self._tilt.value)
+        measured = distance * (1.0 + ALONG * normal[2])
+        seen = measured * np.array(
+            [np.cos(elevation) * np.cos(heading), np.cos(elevation) * np.sin(heading), np.sin(elevation)]
+        )
+        believed = (
+            camera + self._position.value + self._source.errors.sigma_white * self._random.normal(size=3)
+        )
+        found = detection(
+            self._source,
+            self.system,
+            time,
+            believed + seen,
+            believed,
+            message(self.system, believed + seen, believed),
+        )
+        assert found is not None
+        return found
+
+
+class Walker:
+    """Target with white acceleration of a spectral density ``sigma``²."""
+
+    def __init__(self, random: np.random.Generator, sigma: float) -> None:
+        self._random, self._sigma = random, sigma
+        self.place, self.velocity = np.zeros(3), random.normal(size=3)
+
+    def step(self, dt: float) -> None:
+        Q = self._sigma**2 * np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
+        noise = np.linalg.cholesky(Q) @ self._random.normal(size=(2, 3))
+        self.place = self.place + dt * self.velocity + noise[0]
+        self.velocity = self.velocity + noise[1]

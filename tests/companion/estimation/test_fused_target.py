@@ -1,0 +1,174 @@
+"""What counts as a detection, when its image was taken, and what is said of it to the others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from companion.config import CompanionConfig
+from companion.world import World
+from mavlink_bridge.messages import (
+    CameraFovStatus,
+    CameraTrackingGeo,
+    CameraTrackingImage,
+    GlobalPosition,
+    GpsGlobalOrigin,
+    LocalPosition,
+    Source,
+)
+from mavlink_bridge.pinhole import Pinhole, conjugate, extent, rotated, upward
+from tests.companion.estimation.cameras import FLEET, START, message
+
+OWN, NEIGHBOUR, TARGET = 11, 12, 1
+CAMERA = np.array([6.0, 0.0, 5.0])
+OTHER = np.array([0.0, 6.0, 5.0])
+PLACE = np.zeros(3)
+
+
+def world(**source) -> World:
+    config = CompanionConfig.model_validate(
+        {"target_source": {"kind": "fused", **source}, "target": {"rewind_us": 2_000_000}}
+    )
+    found = World(config, OWN, TARGET, FLEET)
+    found.receive(
+        START,
+        "autopilot",
+        GpsGlobalOrigin(Source(OWN, 1), FLEET.latitude, FLEET.longitude, FLEET.altitude, 0),
+    )
+    return found
+
+
+def heard(of: World, now: int, *, neighbour: bool = True) -> None:
+    """Own position, and the neighbour's: 5 ms and 20 ms old when they arrive."""
+    north, east, down = CAMERA[1], CAMERA[0], -CAMERA[2]
+    stamp = now - START
+    of.receive(
+        now, "autopilot", LocalPosition(Source(OWN, 1), stamp - 5_000, (north, east, down), (0.0, 0.0, 0.0))
+    )
+    if neighbour:
+        state = GlobalPosition(
+            Source(NEIGHBOUR, 191), stamp - 20_000, *FLEET.to_geodetic(OTHER), 5.0, (0.0, 0.0, 0.0), None
+        )
+        of.receive(now, "swarm", state)
+
+
+def view(system: int, component: int, stamp: int, place) -> CameraFovStatus:
+    return CameraFovStatus(
+        Source(system, component), stamp, FLEET.to_geodetic(place), None, (1.0, 0.0, 0.0, 0.0), 1.2, 0.8
+    )
+
+
+def own_detection(stamp: int, place=PLACE) -> tuple[CameraFovStatus, CameraTrackingGeo]:
+    return view(OWN, 100, stamp, CAMERA), message(OWN, place, CAMERA)
+
+
+def forwarded(stamp: int, place=PLACE, system: int = NEIGHBOUR) -> tuple[CameraFovStatus, CameraTrackingGeo]:
+    said = message(system, place, OTHER)._replace(source=Source(system, 191))
+    return view(system, 191, stamp, OTHER), said
+
+
+def give(of: World, now: int, link: str, messages) -> None:
+    for one in messages:
+        of.receive(now, link, one)
+
+
+def started(**source) -> tuple[World, int]:
+    found = world(**source)
+    now = START + 1_000_000
+    for tick in range(10):
+        now = START + 1_000_000 + 100_000 * tick
+        heard(found, now)
+    return found, now
+
+
+def test_own_detections_and_forwarded_ones_are_dated_by_the_image():
+    of, now = started()
+    give(of, now, "autopilot", own_detection(now - START - 150_000))
+    assert of.target.age(now) == pytest.approx(150_000, abs=10_000)
+    give(of, now + 10_000, "swarm", forwarded(now - START - 60_000))
+    assert of.target.age(now) == pytest.approx(60_000, abs=25_000)
+    counts = of.target.counts
+    assert (counts.own, counts.others, counts.used, counts.invalid, counts.late) == (1, 1, 2, 0, 0)
+    assert of.target.last(now).position == pytest.approx(PLACE, abs=0.1)
+
+
+def test_without_the_time_of_the_image_it_is_as_old_as_configured():
+    of, now = started(latency_us=300_000)
+    give(of, now, "autopilot", own_detection(0)[1:])
+    assert of.target.age(now) == 300_000
+
+
+SEEN, SAID = own_detection(1_800_000)
+UNUSABLE = {
+    "no vehicle of the fleet": ("swarm", forwarded(1_900_000, system=77)),
+    "no time": ("swarm", forwarded(1_900_000)[1:]),
+    "a neighbour's future": ("swarm", forwarded(20_000_000)),
+    "the future": ("autopilot", own_detection(20_000_000)),
+    "accuracy": ("autopilot", (SEEN, SAID._replace(horizontal_accuracy=1e9))),
+    "another target": ("autopilot", (SEEN, SAID._replace(device=3))),
+    "not tracking": ("autopilot", (SEEN, SAID._replace(status=0))),
+    "far away": ("autopilot", (SEEN, SAID._replace(altitude=1e30))),
+}
+
+
+@pytest.mark.parametrize(("link", "messages"), UNUSABLE.values(), ids=UNUSABLE.keys())
+def test_what_cannot_be_used_is_counted_and_dropped(link, messages):
+    of, now = started(device=0)
+    give(of, now, link, messages)
+    assert of.target.counts.invalid == 1
+    assert of.target.counts.used == 0
+    assert of.target.last(now) is None
+
+
+def test_a_listed_fleet_excludes_others():
+    of, now = started(vehicles=[13])
+    give(of, now, "swarm", forwarded(now - START - 60_000))
+    assert of.target.counts.invalid == 1
+    give(of, now, "autopilot", own_detection(now - START - 150_000))
+    assert of.target.counts.own == 1
+
+
+def test_a_detection_that_arrives_twice_counts_once():
+    of, now = started()
+    for later in (0, 20_000):
+        give(of, now + later, "swarm", forwarded(now - START - 60_000))
+    assert (of.target.counts.used, of.target.counts.invalid) == (1, 1)
+
+
+def test_nan_in_a_message_is_no_position():
+    nan = float("nan")
+    assert CameraTrackingGeo.decode(Source(11, 100), (0, 0, nan, *[nan] * 9, 1, 0)) is None
+
+
+def test_own_detections_are_forwarded_once_with_the_time_of_their_image():
+    of, now = started()
+    assert of.forwards(now) == []
+    give(of, now, "autopilot", own_detection(now - START - 150_000))
+    (out,) = of.forwards(now)
+    assert out.time == pytest.approx(now - 150_000, abs=10_000)
+    assert of.forwards(now + 10_000) == []
+    give(of, now + 20_000, "autopilot", own_detection(now - START - 130_000))
+    assert of.forwards(now + 20_000) == []
+    assert len(of.forwards(now + 100_000)) == 1
+
+
+def test_a_camera_that_tells_the_place_in_the_image_is_projected():
+    of, now = started(height=1.8)
+    # North-west of the camera and below it; the camera looks along the ray, level.
+    yaw = np.arctan2(PLACE[0] - CAMERA[0], PLACE[1] - CAMERA[1])
+    pitch = -0.6
+    cy, sy, cp, sp = np.cos(yaw / 2), np.sin(yaw / 2), np.cos(pitch / 2), np.sin(pitch / 2)
+    attitude = (cy * cp, -sy * sp, cy * sp, sy * cp)
+    camera = Pinhole.of_field(1280, 720, 1.2)
+    offset = PLACE - CAMERA
+    foot = rotated(conjugate(attitude), (offset[1], offset[0], -offset[2]))
+    seen = extent(camera, foot, upward(attitude), 1.8)
+    rectangle = ((seen.column - 20) / 1280, seen.top / 720, (seen.column + 20) / 1280, seen.foot / 720)
+    looking = view(OWN, 100, now - START - 100_000, CAMERA)._replace(
+        attitude=attitude, horizontal_field=camera.fields[0], vertical_field=camera.fields[1]
+    )
+    said = CameraTrackingImage(Source(OWN, 100), 1, 2, 4, None, None, rectangle)
+    give(of, now, "autopilot", (looking, said))
+    assert of.target.last(now).position == pytest.approx(PLACE, abs=0.05)
+    give(of, now, "autopilot", (looking, said._replace(rectangle=None)))
+    assert of.target.counts.invalid == 1

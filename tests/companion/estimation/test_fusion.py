@@ -1,0 +1,308 @@
+"""Laws of the fusion of detections: consistent, independent of the order of arrival, bounded in what one
+sender can do."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chi2
+
+from companion.config.target_source import FusedSource, OwnErrors
+from companion.estimation.detections import Detection, detection
+from companion.estimation.fusion import Fusion
+from companion.estimation.fusion_filter import FIELDS, PER_VEHICLE, TARGET, replay
+from tests.companion.estimation.cameras import START, Vehicle, Walker, message, source_of
+
+WINDOW = 2_000_000
+STEP = 100_000
+EXACT = OwnErrors(
+    sigma_horizontal=0.0, sigma_vertical=0.0, sigma_yaw_deg=0.0, sigma_tilt_deg=0.0, sigma_white=0.0
+)
+
+
+def flight(profile, seed: int, seconds: float = 6.0, vehicles: int = 3):
+    """Detections of a walker, and where it was in the end."""
+    random = np.random.default_rng([seed, vehicles])
+    source = source_of(profile)
+    cameras = [Vehicle(11 + k, 2.1 * k + random.uniform(), source, random) for k in range(vehicles)]
+    walker, found = Walker(random, source.sigma_acceleration), []
+    for tick in range(round(1e6 * seconds / STEP)):
+        walker.step(1e-6 * STEP)
+        for camera in cameras:
+            camera.step(1e-6 * STEP)
+            found.append(camera.sees(START + tick * STEP, walker.place))
+    return source, found, walker
+
+
+def fused(source: FusedSource, detections) -> Fusion:
+    fusion = Fusion(source, WINDOW)
+    for one in detections:
+        fusion.put(one)
+    return fusion
+
+
+def at(fusion: Fusion, time: int):
+    known = fusion.at(time, 1_000_000)
+    assert known is not None
+    return known
+
+
+@pytest.mark.parametrize("profile", ["truth", "rtk", "gnss"])
+def test_errors_are_as_large_as_the_covariance_says(profile):
+    """NEES of the position over flights with other errors, and NIS, within the 95 % bands of χ²."""
+    count, nees, nis = 60, [], []
+    for seed in range(count):
+        source, found, walker = flight(profile, seed, 4.0)
+        fusion = fused(source.model_copy(update={"gate": 1e3}), found)
+        known = at(fusion, found[-1].time)
+        off = known.position - walker.place
+        nees.append(float(off @ np.linalg.solve(known.covariance, off)))
+        # The first ones say where it is; the kept ones are a window.
+        nis.append(fusion.innovations[-15:])
+    low, high = chi2.ppf([0.025, 0.975], 3 * count) / count
+    assert low < np.mean(nees) < high
+    numbers = np.concatenate(nis)
+    low, high = chi2.ppf([0.025, 0.975], 3 * len(numbers)) / len(numbers)
+    assert low < numbers.mean() < high
+
+
+def test_treated_as_white_a_bias_of_gnss_makes_it_far_too_confident():
+    nees = []
+    for seed in range(10):
+        source, found, walker = flight("gnss", seed, 4.0)
+        known = at(fused(source.model_copy(update={"own_errors": EXACT, "gate": 1e3}), found), found[-1].time)
+        off = known.position - walker.place
+        nees.append(float(off @ np.linalg.solve(known.covariance, off)))
+    assert np.mean(nees) > 30.0
+
+
+@given(st.integers(0, 1000))
+@settings(max_examples=15)
+def test_the_order_of_arrival_does_not_matter(seed):
+    source, found, _ = flight("rtk", seed, 1.5)
+    shuffled = [found[k] for k in np.random.default_rng(seed).permutation(len(found))]
+    first, second = Fusion(source, WINDOW), Fusion(source, WINDOW)
+    for one in found:
+        first.put(one)
+    for k, one in enumerate(shuffled):
+        second.put(one)
+        if k % 7 == 0:
+            second.at(one.time, WINDOW)
+    a, b = at(first, found[-1].time), at(second, found[-1].time)
+    # Vehicles are numbered as they are first seen.
+    np.testing.assert_allclose(a.position, b.position, atol=1e-6)
+    np.testing.assert_allclose(a.covariance, b.covariance, atol=1e-6)
+    assert first.used == second.used
+
+
+def test_without_lasting_errors_it_is_filterpys_kalman_filter():
+    filterpy = pytest.importorskip("filterpy.kalman")
+    source, found, _ = flight("truth", 3, 1.0, vehicles=1)
+    source = source.model_copy(update={"own_errors": EXACT, "gate": 1e9})
+    known = at(fused(source, found), found[-1].time)
+    other = filterpy.KalmanFilter(dim_x=6, dim_z=3)
+    other.x = np.concatenate([found[0].fields[:3], np.zeros(3)])[:, None]
+    other.P = np.diag([1e4] * 3 + [4.0] * 3)
+    other.H = np.eye(3, 6)
+    dt, before = 0.1, found[0].time
+    for one in found:
+        if one.time > before:
+            other.F = np.block([[np.eye(3), dt * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])
+            Q = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]]) * source.sigma_acceleration**2
+            other.Q = np.kron(Q, np.eye(3))
+            other.predict()
+            before = one.time
+        R = one.fields[3:12].reshape(3, 3)
+        if np.trace(other.P[:3, :3]) < 25.0:
+            R = R * (np.linalg.norm(other.x[:3, 0] - one.fields[18:21]) / one.fields[21]) ** 2
+        other.update(one.fields[:3], R=R)
+    np.testing.assert_allclose(known.position, other.x[:3, 0], atol=1e-9)
+    np.testing.assert_allclose(known.covariance, other.P[:3, :3], atol=1e-9)
+
+
+def test_several_cameras_are_better_than_the_best():
+    errors = []
+    for seed in range(20):
+        source, found, walker = flight("rtk", seed, 4.0, vehicles=5)
+        alone = [
+            at(fused(source, [d for d in found if d.vehicle == 11 + k]), found[-1].time) for k in range(5)
+        ]
+        all_ = at(fused(source, found), found[-1].time)
+        errors.append([np.linalg.norm(one.position - walker.place) ** 2 for one in (*alone, all_)])
+    *single, together = np.sqrt(np.mean(errors, axis=0))
+    assert together <= 0.55 * min(single)
+
+
+def test_a_lost_target_moves_on_for_a_bounded_time_and_becomes_uncertain():
+    source, found, _ = flight("rtk", 1)
+    fusion = fused(source, found)
+    end = found[-1].time
+    traces, places = [], []
+    for after in (0, 500_000, 1_000_000, 3_000_000, 10_000_000):
+        known = at(fusion, end + after)
+        traces.append(np.trace(known.covariance))
+        places.append(known.position)
+        assert known.time == end
+    assert traces == sorted(traces)
+    np.testing.assert_array_equal(places[2], places[3])
+    np.testing.assert_array_equal(at(fusion, end + 10_000_000).velocity, 0.0)
+
+
+@given(st.integers(0, 500), st.tuples(*[st.floats(-30.0, 30.0)] * 3))
+@settings(max_examples=40)
+def test_one_detection_moves_the_estimate_by_no_more_than_its_gate_allows(seed, by):
+    """‖Δp‖² ≤ γ·λ_max(P): Δp = K y, K S Kᵀ = P − P⁺ ≤ P, and yᵀS⁻¹y ≤ γ."""
+    source, found, _ = flight("gnss", seed, 1.0)
+    end = found[-1].time
+    before, wrong = at(fused(source, found), end), found[-1]
+    fields = wrong.fields.copy()
+    fields[:3] += by
+    after = at(fused(source, [*found, replace_fields(wrong, end, fields)]), end)
+    most = sqrt(source.gate * float(np.linalg.eigvalsh(before.covariance)[-1]))
+    assert float(np.linalg.norm(after.position - before.position)) <= most
+
+
+def replace_fields(one: Detection, time: int, fields) -> Detection:
+    return one._replace(time=time, fields=fields, vehicle=one.vehicle)
+
+
+@pytest.mark.parametrize("strategy", ["edge", "patient"])
+@pytest.mark.parametrize("profile", ["truth", "rtk", "gnss"])
+def test_one_compromised_neighbour_of_five_moves_it_by_a_few_sigmas_at_most(profile, strategy):
+    """It knows the filter, and always pushes east: to the edge of the gate, or just below suspicion."""
+    worst = []
+    for seed in range(4):
+        source, found, _ = flight(profile, seed, 6.0, vehicles=5)
+        honest, attacked = Fusion(source, WINDOW), Fusion(source, WINDOW)
+        share = 0.999 if strategy == "edge" else sqrt(5.5 / source.gate)
+        for one in found:
+            if one.vehicle != 15:
+                honest.put(one)
+                attacked.put(one)
+            elif one.time > START + 1_000_000:
+                attacked.put(one._replace(fields=pushed(attacked, one, share)))
+        a, b = at(honest, found[-1].time), at(attacked, found[-1].time)
+        sigma = sqrt(float(np.linalg.eigvalsh(a.covariance)[-1]))
+        worst.append(float(np.linalg.norm(a.position - b.position)) / sigma)
+    assert max(worst) < sqrt(source_of(profile).gate)
+
+
+def pushed(fusion: Fusion, one: Detection, share: float):
+    """The detection, moved east as far as a share of the gate allows."""
+    known = at(fusion, one.time)
+    fields = one.fields.copy()
+    R = fields[3:12].reshape(3, 3)
+    reach = sqrt(16.27) * share * sqrt(float((known.covariance + R)[0, 0]))
+    fields[:3] = known.position + np.array([reach, 0.0, 0.0])
+    return fields
+
+
+def test_false_detections_make_no_jump():
+    random = np.random.default_rng(5)
+    for seed in range(5):
+        source, found, _ = flight("rtk", seed, 6.0)
+        wrong = [
+            one._replace(fields=np.concatenate([random.uniform(-15, 15, 3), one.fields[3:]]))
+            if random.uniform() < 0.05 and one.time > START
+            else one
+            for one in found
+        ]
+        clean, fusion = Fusion(source, WINDOW), Fusion(source, WINDOW)
+        for one, other in zip(found, wrong, strict=True):
+            clean.put(one)
+            fusion.put(other)
+            if one.time > START + 1_000_000:
+                a, b = at(clean, one.time), at(fusion, one.time)
+                assert np.linalg.norm(a.position - b.position) < 1.0
+
+
+def test_after_a_false_beginning_it_begins_anew():
+    source, found, walker = flight("rtk", 2, 4.0)
+    fields = found[0].fields.copy()
+    fields[:3] += 30.0
+    fusion = Fusion(source, WINDOW)
+    for one in (found[0]._replace(fields=fields), *found[1:]):
+        fusion.put(one)
+        fusion.at(one.time, WINDOW)
+    known = at(fusion, found[-1].time)
+    assert np.linalg.norm(known.position - walker.place) < 0.5
+    # After a second without anything that passes, or at once if the first was not trusted.
+    assert known.time == found[-1].time
+
+
+def test_an_estimate_that_has_the_same_detections_makes_it_no_more_confident():
+    """Covariance intersection with the own estimate: the same information once more is none."""
+    source, found, _ = flight("rtk", 4, 2.0)
+    fusion = fused(source, found)
+    known = at(fusion, found[-1].time)
+    fields = found[-1].fields.copy()
+    fields[:3], fields[3:12] = known.position, known.covariance.ravel()
+    for _ in range(20):
+        fusion.put(Detection(14, found[-1].time, fields, True, 1.0, found[-1].message))
+    again = at(fusion, found[-1].time)
+    assert np.trace(again.covariance) >= 0.999 * np.trace(known.covariance)
+    np.testing.assert_allclose(again.position, known.position, atol=1e-6)
+
+
+def test_a_better_estimate_of_others_is_used():
+    source, found, walker = flight("gnss", 4, 2.0)
+    known = at(fused(source, found), found[-1].time)
+    fields = found[-1].fields.copy()
+    fields[:3], fields[3:12] = walker.place, (0.01 * np.eye(3)).ravel()
+    better = fused(source, [*found, Detection(14, found[-1].time, fields, True, 1.0, found[-1].message)])
+    again = at(better, found[-1].time)
+    assert np.trace(again.covariance) < 0.5 * np.trace(known.covariance)
+    assert np.linalg.norm(again.position - walker.place) < np.linalg.norm(known.position - walker.place)
+
+
+def test_what_is_older_than_the_window_is_late():
+    source, found, _ = flight("rtk", 1, 4.0)
+    fusion = fused(source, found)
+    assert not fusion.put(found[0])
+    assert fusion.late == 1
+
+
+def test_memory_is_bounded_and_forgetting_changes_nothing():
+    source, found, _ = flight("rtk", 1, 12.0, vehicles=2)
+    short, long = Fusion(source, 500_000), Fusion(source, 20_000_000)
+    for one in found:
+        short.put(one)
+        long.put(one)
+        short.at(one.time, WINDOW)
+    a, b = at(short, found[-1].time), at(long, found[-1].time)
+    assert len(short._detections) < 32
+    assert len(long._detections) == len(found)
+    assert short.used + short.refused == len(found)
+    np.testing.assert_allclose(a.position, b.position, atol=1e-9)
+    np.testing.assert_allclose(a.covariance, b.covariance, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"horizontal_accuracy": 0.0},
+        {"horizontal_accuracy": -1.0},
+        {"vertical_accuracy": 1e6},
+        {"heading_accuracy": 3.0},
+        {"heading_accuracy": 0.0},
+    ],
+)
+def test_absurd_accuracies_are_no_detection(changes):
+    camera, place = np.array([6.0, 0.0, 5.0]), np.zeros(3)
+    good = message(11, place, camera)
+    assert detection(source_of("rtk"), 11, START, place, camera, good) is not None
+    assert detection(source_of("rtk"), 11, START, place, camera, good._replace(**changes)) is None
+    assert detection(source_of("rtk"), 11, START, place, place, good) is None
+
+
+def test_a_kernel_of_no_vehicle_and_no_detection_does_nothing():
+    n = TARGET + PER_VEHICLE
+    empty = np.zeros(0, dtype=np.int64)
+    replay(
+        empty, empty, np.zeros((0, FIELDS)), 0, 0, START, np.zeros(n), np.eye(n), np.zeros(1), np.ones(13),
+        np.zeros((0, n)), np.zeros((0, n, n)), np.zeros((0, 1)), np.zeros(0, dtype=bool), np.zeros(0),
+    )  # fmt: skip
