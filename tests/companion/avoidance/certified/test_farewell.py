@@ -156,7 +156,7 @@ def test_who_lands_without_a_reservation_says_farewell_with_a_column() -> None:
         bench.datagram("swarm", Tunnel(other, 0, 0, AGREEMENTS, pack_statement(said))),
     )
     bench.order(mavlink.MAV_CMD_NAV_LAND)
-    sent = bench.fly(5.0)
+    sent = bench.fly(8.0)
     assert bench.phase is Phase.DONE
     told = only(Tunnel, sent, "swarm")
     columns = {one.epoch: one.column for one in (unpack(m.payload) for m in told if m.payload_type == PLAN)}
