@@ -40,6 +40,8 @@ _SYSTEM_IDS = 255
 """Number of system ids."""
 _PRIORITY_US = 1_000_000
 """µs after a companion's position during which positions of the same vehicle's autopilot are ignored."""
+_KEPT_US = 3_000_000
+"""A vehicle stays in a perception formation for this time (µs) after its last plan or position."""
 _FLEET_US = 5_000_000
 """A vehicle whose companion has been silent for longer (µs) is no vehicle of the fleet."""
 _MAX_PLAN_DEVIATION = 1.0
@@ -117,6 +119,8 @@ class Neighbours:
         """m: least distance to a neighbour so far, by its messages; updated if ``guard.near`` is set."""
         self._brief = False
         # Committed plans are received by the certified avoidance alone.
+        self._keeps_mates = isinstance(config.formation, Perception)
+        self._planned: dict[int, int] = {}
         self._sees_no_plans = config.avoidance == "certified" and isinstance(config.formation, Perception)
         # Moving obstacles: they may be larger than a vehicle and are not bound by its limits.
         self._moving_obstacles = {one.system for one in config.moving}
@@ -334,6 +338,8 @@ class Neighbours:
         if not self._ids:
             return Mates()
         fresh = self._planning(now)
+        if self._keeps_mates:
+            fresh |= self._planned_lately(now, fresh)
         age = np.minimum(np.maximum(now - self._times[fresh], 0), self._config.neighbour.extrapolate_us)
         states = self._states[fresh]
         ids = tuple(compress(self._ids, fresh.tolist()))
@@ -343,6 +349,17 @@ class Neighbours:
         """Return the system ids of the vehicles that fly by plans of their own."""
         self._update_rows()
         return frozenset(compress(self._ids, self._planning(now).tolist())) if self._ids else frozenset()
+
+    def _planned_lately(self, now: int, planning: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return, for each neighbour, whether its plan was fresh in the last ``_KEPT_US``.
+
+        ``planning`` (M,): whether it is fresh at ``now`` (µs). On a link that loses messages a neighbour would
+        leave the formation and come back every few seconds.
+        """
+        for system in compress(self._ids, planning.tolist()):
+            self._planned[system] = now
+        lately = [now - self._planned.get(system, now - _KEPT_US - 1) <= _KEPT_US for system in self._ids]
+        return np.array(lately) & (now - self._times <= _KEPT_US)
 
     def _planning(self, now: int) -> NDArray[np.bool_]:
         """Return, for each neighbour, whether it flies by plans of its own."""

@@ -395,3 +395,21 @@ def test_what_came_lately_is_held_where_it_says_however_old_it_is_dated(v, delay
     found = neighbours.obstacles(came + later)
     assert found.d_min == [config.field.d_min]
     np.testing.assert_allclose(found.positions[0], X + 0.1 * v + AHEAD * v, atol=0.01)
+
+
+def test_a_mate_of_a_perception_formation_outlasts_some_lost_messages():
+    later = NOW + CONFIG.guard.plan_stale_us + 100_000
+    for kind, kept in (("perception", (OTHER,)), ("spread", ())):
+        config = CompanionConfig.model_validate({"formation": {"kind": kind}})
+        neighbours = hearing(position(X, V), plan(X, V), config=config)
+        assert neighbours.mates(NOW).ids == (OTHER,)
+        assert neighbours.mates(later).ids == kept
+        assert neighbours.mates(NOW + 4_000_000).ids == ()
+
+
+def test_with_committed_plans_a_mate_is_who_reports_its_position():
+    config = CompanionConfig.model_validate({"formation": {"kind": "perception"}, "avoidance": "certified"})
+    autopilot = position(X, V, system=13)._replace(source=Source(13, 1))
+    neighbours = hearing(position(X, V), autopilot, config=config)
+    assert neighbours.mates(NOW).ids == (OTHER,)
+    assert neighbours.mates(NOW + 4_000_000).ids == ()
