@@ -353,8 +353,8 @@ class Neighbours:
     def _planned_lately(self, now: int, planning: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return, for each neighbour, whether its plan was fresh in the last ``_KEPT_US``.
 
-        ``planning`` (M,): whether it is fresh at ``now`` (µs). Otherwise a neighbour would leave the formation
-        and come back every few seconds on a link that loses messages.
+        ``planning`` (M,): whether it is fresh at ``now`` (µs). Otherwise neighbours would leave the
+        formation and come back every few seconds on a link that loses messages.
         """
         for system in compress(self._ids, planning.tolist()):
             self._planned[system] = now
