@@ -148,6 +148,9 @@ def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
     most = np.sqrt(max(left, 0.0) / np.count_nonzero(through))
     needed = np.minimum(motion.velocity**2 / (2.0 * room), most)
     rates = np.where(through, np.maximum(rates, needed), rates)
+    pressed = float(np.linalg.norm(rates[through]))
+    if pressed * pressed > left:
+        rates = np.where(through, rates * (np.sqrt(max(left, 0.0)) / pressed), rates)
     each = np.maximum(0.0, np.abs(motion.velocity) - rates * h * np.arange(n + 1)[:, None])
     accelerations = np.diff(each, axis=0) / h * np.sign(motion.velocity)
     return roll_out(now, dt, motion.position, motion.velocity, accelerations)

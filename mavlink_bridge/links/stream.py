@@ -46,6 +46,8 @@ class Stream:
         self._assembler = Assembler()
         self._waiting = b""
         self._stuck_at: int | None = None
+        self.read_at = 0
+        """Time (µs) of the last read, for the owner."""
         self.alive = True
         """False after the other side has closed or an error; then only ``close`` is useful."""
 

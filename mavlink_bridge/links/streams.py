@@ -21,6 +21,8 @@ MOST_FRAMES: Final = 16
 A receiver bounds its work by the datagram. A UDP datagram holds what its sender put together; what a read of
 a stream happens to hold must not be too much.
 """
+_SLOW_READER: Final = 500_000
+"""µs between reads from a peer that does not take what is sent: its orders must still get through."""
 _MAX_READ_BYTES: Final = 16384
 """Bytes after which one ``receive`` reads no further stream: many full streams would take long to parse."""
 
@@ -35,7 +37,7 @@ class StreamLink:
     """
 
     _waits_for_readers = False
-    """Whether nothing is read from a peer while half of what may wait for it waits."""
+    """Whether little is read from a peer while half of what may wait for it waits: twice a second."""
 
     def __init__(self, clock: Clock, backlog: int) -> None:
         # The selector's own file descriptor stays the same while streams come and go.
@@ -186,7 +188,11 @@ class StreamLink:
     def _serve(self, stream: Stream, found: list[bytes]) -> int:
         """Read ``stream`` once, so that a busy sender does not delay others; return the number of bytes."""
         stream.flush()
-        data = None if self._waits_for_readers and stream.backed_up else stream.read()
+        data = None
+        now = self._clock.now()
+        if not (self._waits_for_readers and stream.backed_up and now - stream.read_at < _SLOW_READER):
+            stream.read_at = now
+            data = stream.read()
         if data:
             found += _pieces(data)
         stream.flush()

@@ -11,6 +11,7 @@ import pytest
 from mavlink_bridge import messages as m
 from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.links.endpoints import TcpIn
+from mavlink_bridge.links.stream import Stream
 from mavlink_bridge.links.streams import MOST_FRAMES
 from mavlink_bridge.links.tcp import TcpListener
 from mavlink_bridge.messages import CommandAck, CommandLong, Message, ParamSet, ParamValue, Ping, Source
@@ -108,6 +109,24 @@ def test_a_client_that_does_not_read_is_not_read_from_and_loses_nothing(server: 
     assert MOST_FRAMES * server.link.counters.received < count
     answers = [message.time for message in send(server, data[sent:]) if isinstance(message, Ping)]
     assert answers == list(range(count))
+
+
+def test_orders_of_a_client_that_stays_backed_up_get_through(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It reads all the time, but never as much as waits for it."""
+    monkeypatch.setattr(Stream, "backed_up", property(lambda _stream: True))
+    order = Codec().encode(CommandLong(ME, 11, 1, 21, 0, (0.0,) * 7))
+    read: list[bytes] = []
+    server.link.receive()
+    server.client.send(order)
+    for turn in range(5000):
+        server.clock.wait_until(1_000 * turn)
+        server.link.send(bytes(4096))
+        with suppress(BlockingIOError):
+            server.client.recv(3000)
+        read += server.link.receive()
+    assert read == [order]
 
 
 def test_what_is_read_at_once_comes_in_pieces_that_join_to_it(server: Server) -> None:

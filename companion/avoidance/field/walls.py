@@ -188,7 +188,8 @@ def _keep(
         below, above = min(lowest[i], x), max(highest[i], x)
         last, change = flown[i], jerk * step
         for k in range(n):
-            wanted, least, most = a[k, i], -braking, braking
+            # The braking of three axes at once is within a_total.
+            wanted, least, most = min(max(a[k, i], -braking), braking), -braking, braking
             if jerk > 0.0:
                 wanted = min(max(wanted, last - change), last + change)
                 least, most = max(least, last - change), min(most, last + change)

@@ -304,3 +304,14 @@ def test_garbage_packets_do_no_harm() -> None:
     for turn in range(30):
         planner.step(START + DT * turn, *STATE, packets=[random.bytes(60), b"", b"\xfd" * 300])
     assert planner.step(START + 2.0, *STATE).plan is not None
+
+
+def test_an_array_of_neighbours_gets_ids_beside_the_own() -> None:
+    rows = np.array([[0.0, 6.0, 5.0, 0.0, 0.0, 0.0], [6.0, 0.0, 5.0, 0.0, 0.0, 0.0]])
+    named = [Neighbour(2, rows[0, :3], rows[0, 3:]), Neighbour(3, rows[1, :3], rows[1, 3:])]
+    once, again = (
+        Planner(FIELD).step(0.0, *STATE, goal=(8.0, 8.0, 5.0), neighbours=others) for others in (rows, named)
+    )
+    assert once.plan is not None
+    assert again.plan is not None
+    np.testing.assert_array_equal(once.plan.positions, again.plan.positions)

@@ -117,6 +117,7 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "count": (lambda: Batch(count=0), "count: is 0"),
     "a hover in the ground": (lambda: Batch(positions=(0.0, 0.0, -1.0)), "cannot hover"),
     "a type": (lambda: Batch("firefli"), "did you mean 'firefly'?"),
+    "a place of two": (lambda: Vehicle().step((0.0, 0.0), (3.0, 0.0, 0.0)), "position: has shape (2,)"),
     "a rotor": (lambda: Batch().fail_rotor(0, 9, 0.5), "its rotors are 0 to 5"),
 }
 

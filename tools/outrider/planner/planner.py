@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
+from itertools import count
 from typing import cast
 
 import numpy as np
@@ -179,19 +180,20 @@ def _neighbours(given: Neighbours, own: int) -> tuple[Neighbour, ...]:
     """Return ``given`` as neighbours, each id once and none the ``own``. Raises InputError."""
     if isinstance(given, np.ndarray):
         rows = checked("neighbours", given, ("M", 6), "m and m/s")
-        found = tuple(Neighbour(k, row[:3], row[3:]) for k, row in enumerate(rows, 1))
+        ids = (k for k in count(1) if k != own)
+        found = tuple(Neighbour(k, row[:3], row[3:]) for k, row in zip(ids, rows, strict=False))
     else:
         found = tuple(given)
-    ids: set[int] = set()
+    known: set[int] = set()
     for one in found:
         if not isinstance(one, Neighbour):
             raise InputError(
                 f"neighbours: one is a {type(one).__name__}; allowed: Neighbour, or an array (M, 6)"
             )
-        if one.id in ids or one.id == own:
+        if one.id in known or one.id == own:
             whose = "the planner's own id" if one.id == own else "there twice"
             raise InputError(f"neighbours: id {one.id} is {whose}; allowed: each id once, not the own")
-        ids.add(one.id)
+        known.add(one.id)
     return found
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from outrider.errors import InputError
 from outrider.sim.batch import Batch
 from sitl.vehicle.airframe import FloatArray
 from sitl.vehicle.config import VehicleConfig
@@ -67,8 +68,11 @@ class Vehicle:
         if position is None:
             command = None
         else:
-            parts = np.ravel(position), np.ravel(velocity), np.ravel(acceleration), [yaw, yaw_rate]
-            command = np.concatenate(parts)[None]
+            given = {"position": position, "velocity": velocity, "acceleration": acceleration}
+            for name, value in given.items():
+                if np.shape(value) != (3,):
+                    raise InputError(f"{name}: has shape {np.shape(value)}; allowed: (3,), east, north, up")
+            command = np.concatenate([*given.values(), [yaw, yaw_rate]])[None]
         return np.ravel(self._batch.step(command, steps, wind=wind))
 
     def fail_rotor(self, rotor: int, left: float) -> None:

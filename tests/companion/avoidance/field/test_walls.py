@@ -75,16 +75,18 @@ def test_no_neighbours_press_a_plan_through_a_wall_or_beyond_v_max(seed, name, p
 
 @LAWS
 @given(
-    height=numbers(3.0, 10.0),
+    room=vectors(7.0),
     velocity=vectors(5.0),
     pushes=st.lists(vectors(7.0), min_size=STEPS, max_size=STEPS),
     name=st.sampled_from(["paper", "slow"]),
 )
-def test_any_push_is_held_where_the_vehicle_can_stop(height, velocity, pushes, name):
+def test_any_push_is_held_where_the_vehicle_can_stop(room, velocity, pushes, name):
+    """In any corner of the box, ``room`` from its walls: their signs choose the corner."""
     limits = CONFIGS[name].limits
     fastest, braking = np.array(limits.v_max), limits.a_total / np.sqrt(3.0)
-    position = np.array([0.0, 0.0, height])
-    room = np.where(velocity < 0.0, position - limits.box_min, limits.box_max - position)
+    low, high = np.array(limits.box_min), np.array(limits.box_max)
+    position = np.clip(np.where(room < 0.0, high + room, low + room), low, high)
+    room = np.where(velocity < 0.0, position - low, high - position)
     assume(
         (velocity**2 / braking + 0.2 * np.abs(velocity) <= room).all() and (np.abs(velocity) <= fastest).all()
     )
