@@ -190,20 +190,32 @@ def test_who_can_meet_a_column_is_near_or_unknown(x: float | None, clear: bool) 
     assert one.clear({OTHER}) is clear
 
 
-def test_a_column_that_was_never_reserved_waits_for_all_agreements() -> None:
-    """Another controller took the vehicle off: planes may be kept that are not upright."""
-    for reserved in (False, True):
-        flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
-        stands = Motion(np.zeros(3), np.zeros(3), np.zeros(3))
-        for now in range(EPOCH, EPOCH + 4 * LENGTH, LENGTH):
-            if reserved:
-                flight.park(now, stands, joins=True)
-            else:
-                flight.reservation.begin(now, stands.position, joins=True)
-        far = resting(now, DT, STEPS, (9.0, 0.0, 0.0), FLEET.fingerprint)
-        flight.agreements.receive_plan(now, OTHER, pack(far))
-        assert flight.agreements.missing() == {OTHER}
-        assert flight.reservation.may_be_left() is reserved
+@pytest.mark.parametrize(("reserved", "x"), [(False, 9.0), (True, 9.0), (True, 1.0)])
+def test_a_column_waits_for_all_agreements_if_it_was_never_reserved_or_another_may_meet_it(
+    reserved: bool, x: float
+) -> None:
+    """Another controller took the vehicle off, so that planes may be kept that are not upright; or the plan
+    of one that begins anew, at ``x`` (m), is too near."""
+    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    stands = Motion(np.zeros(3), np.zeros(3), np.zeros(3))
+    for now in range(EPOCH, EPOCH + 4 * LENGTH, LENGTH):
+        if reserved:
+            flight.park(now, stands, joins=True)
+        else:
+            flight.reservation.begin(now, stands.position, joins=True)
+    begun = resting(now, DT, STEPS, (x, 0.0, 0.0), FLEET.fingerprint)
+    flight.agreements.receive_plan(now, OTHER, pack(begun))
+    assert flight.agreements.missing() == {OTHER}
+    assert flight.reservation.may_be_left() is (reserved and x > 2.0)
+
+
+def test_a_column_that_is_begun_elsewhere_has_not_been_reserved() -> None:
+    """It was moved on the ground: what the others keep is the column before."""
+    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    for number, x in enumerate((0.0, 0.0, 0.0, 0.0, 3.0)):
+        stands = Motion(np.array([x, 0.0, 0.0]), np.zeros(3), np.zeros(3))
+        flight.park(EPOCH + number * LENGTH, stands, joins=True)
+        assert flight.reservation.was_reserved is (number in (2, 3))
 
 
 def test_who_does_not_take_off_is_passed_and_is_not_waited_for() -> None:
@@ -423,7 +435,7 @@ def ignore_the_column(patch: pytest.MonkeyPatch) -> None:
 
 
 def agree_nearer_than_allowed(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Agreements, "near", lambda self, plans=None: set())
+    patch.setattr(Agreements, "near", lambda self, plans=None, column=None: set())
     patch.setattr(Negotiation, "_reservable", lambda self, newest, plans: True)
 
 
