@@ -52,13 +52,13 @@ class AnnouncedPlans:
     def horizon(self, now: int) -> Horizon | None:
         """Return the committed plan at ``now`` (µs): the newest that has begun; None without one.
 
-        A column is at ``height``, if that is not the plan's.
+        A column whose plan has no vertical motion is at ``height``.
         """
         epoch = max((epoch for epoch in self._plans if epoch <= now), default=None)
         if epoch is None:
             return None
         plan, height = self._plans[epoch], self.height
-        if not plan.column or height is None or abs(height - plan.position_m[2]) <= AGREES_M:
+        if not plan.column or any(a[2] for a in (plan.velocity, *plan.accelerations)):
             height = None
         if self._cached is None or self._cached[0] is not plan or self._cached[1] != height:
             horizon = horizon_of(plan)

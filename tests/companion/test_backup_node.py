@@ -72,6 +72,8 @@ class Bench:
         self.plans = [plan_from(BEGIN)]
         self.height: float | None = None
         """Height (m) of the companion's set-points; None: that of the plan."""
+        self.east = 0.0
+        """Distance (m) of the companion's set-points east of the plan."""
         self.sent: list[tuple[int, SetpointLocal]] = []
 
     def run(self, seconds: float) -> list[tuple[int, SetpointLocal]]:
@@ -112,6 +114,7 @@ class Bench:
         now = self.now + self.ahead
         plan = max((p for p in self.plans if p.epoch <= now), default=plan_from(BEGIN), key=lambda p: p.epoch)
         place = horizon_of(plan).at(now + CONFIG.setpoint_lead_us).position
+        place[0] += self.east
         if self.height is not None:
             place[2] = self.height
         ned, zero = (float(place[1]), float(place[0]), -float(place[2])), (0.0, 0.0, 0.0)
@@ -165,6 +168,39 @@ def test_a_set_point_at_another_height_agrees_with_no_plan_in_space_and_a_nan_wi
     bench.speaks = False
     assert bench.run(2.0) == []
     assert bench.node.farewell(bench.now) == []
+
+
+@pytest.mark.parametrize(("east", "flies"), [(0.25, True), (0.35, False)])
+@pytest.mark.parametrize("height", [0.1, 0.35, 5.0])
+def test_only_the_horizontal_distance_of_a_set_point_from_a_column_counts(
+    height: float, east: float, flies: bool
+) -> None:
+    """The plan's height is 0.1 m."""
+    bench = hovering(column=True)
+    bench.speaks, bench.height, bench.east = True, height, east
+    bench.run(0.1)
+    bench.speaks = False
+    sent = bench.run(1.0)
+    assert bool(sent) is flies
+    for _, message in sent:
+        np.testing.assert_allclose(message.position, (2.0, 1.0, -height), atol=1e-4)
+
+
+@pytest.mark.parametrize("up", [0.0, 0.35])
+def test_a_column_that_still_moves_vertically_is_flown_at_the_heights_of_its_plan(up: float) -> None:
+    """It is made of a plan in space."""
+    bench = Bench()
+    bench.plans = [plan_from(BEGIN)._replace(column=True)]
+    assert bench.run(1.0) == []
+    place = horizon_of(bench.plans[0]).at(bench.now + CONFIG.setpoint_lead_us).position
+    bench.height = float(place[2]) + up
+    bench.run(0.02)
+    bench.speaks = False
+    sent = bench.run(1.0)
+    assert bool(sent) is (up == 0.0)
+    for time, message in sent:
+        planned = horizon_of(bench.plans[0]).at(time + CONFIG.setpoint_lead_us).position
+        assert -message.position[2] == pytest.approx(planned[2], abs=2e-3)
 
 
 def test_a_column_that_becomes_a_plan_in_space_is_flown_at_the_plans_height() -> None:

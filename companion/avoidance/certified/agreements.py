@@ -160,12 +160,14 @@ class Agreements:
         for peer in self._peers.values():
             peer.leave(epoch)
 
-    def rejoin(self) -> None:
-        """Begin anew with the first plan after the own farewell; without a farewell do nothing."""
-        if self._farewell is not None:
-            self.since, self._farewell = self._farewell + self._config.epoch_us, None
-            for peer in self._peers.values():
-                peer.begin()
+    def rejoin(self) -> bool:
+        """Begin anew with the first plan after the own farewell; return False without a farewell."""
+        if self._farewell is None:
+            return False
+        self.since, self._farewell = self._farewell + self._config.epoch_us, None
+        for peer in self._peers.values():
+            peer.begin()
+        return True
 
     def made(self, plan: WirePlan) -> bool:
         """File the own newest plan, which keeps all agreements of the lists; return whether it is new."""

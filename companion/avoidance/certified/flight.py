@@ -106,13 +106,16 @@ class CertifiedFlight:
         of ``position``, unless another controller has flown the vehicle far from it. Otherwise a plan at rest
         at ``position`` begins, which is not announced before the companion is in control; ``anchored_anew``
         counts this if a plan had been announced. The column of a vehicle that was parked does not continue:
-        it may be nearer to the others' plans than an agreement in the air allows.
+        it may be nearer to the others' plans than an agreement in the air allows. The same applies to one
+        that was never reserved, of a vehicle that was not in control or has said farewell, as after a landing
+        without a reservation: beside a nearer plan it could neither be agreed on nor left.
         """
         self._polled_at = now
-        self.agreements.rejoin()
+        returns = self.agreements.rejoin()
         commitment, horizon = self.commitment, self.commitment.horizon()
-        parked = commitment.column and not self.reservation.joined and not self._in_control
-        if horizon is not None and not parked:
+        reserved = self.reservation.was_reserved and (self.reservation.joined or self._in_control)
+        alone = commitment.column and not reserved and (returns or not self._in_control)
+        if horizon is not None and not alone:
             difference = horizon.at(now).position - position
             if commitment.column:
                 self._hover(position[2])
@@ -124,6 +127,7 @@ class CertifiedFlight:
                 commitment.turn(now)
                 return
         self.agreements.begin(commitment.begin(now, position))
+        self.reservation.watch(now)
         commitment.anchored_anew += self._announced
         self._in_control = self._announced = False
 

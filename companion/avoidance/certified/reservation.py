@@ -28,7 +28,8 @@ class Reservation:
     """Reservation of the column of one vehicle.
 
     ``beside`` (m): how far from its column a parked vehicle may report its position. ``joined``: the vehicle
-    takes part; otherwise it is parked, or its companion has not begun.
+    takes part; otherwise it is parked, or its companion has not begun. ``was_reserved``: the own newest plan
+    is a column that has been reserved for long enough, at the last ``watch`` or before.
     """
 
     def __init__(
@@ -39,7 +40,7 @@ class Reservation:
         self._joins_within = _MOVED * max(config.drift, config.tube)
         self._since: int | None = None
         self._in_the_way: set[int] = set()
-        self._was_reserved = False
+        self.was_reserved = False
         self.joined = False
 
     def begin(self, now: int, place: Array, *, joins: bool) -> None:
@@ -59,7 +60,7 @@ class Reservation:
             self._in_the_way = agreements.near(column=column)
         if off > within or (column is not None and not self._in_the_way):
             agreements.begin(commitment.begin(now, place, column=True))
-            self._since, self._was_reserved = None, False
+            self._since, self.was_reserved = None, False
         newest = commitment.announced()
         if newest is not None:
             agreements.made(newest)
@@ -95,7 +96,7 @@ class Reservation:
             self._since = None
         elif self._since is None:
             self._since = now
-        self._was_reserved = column and (self._was_reserved or self._lasts(now))
+        self.was_reserved = column and (self.was_reserved or self._lasts(now))
 
     def may_be_left(self) -> bool:
         """Return whether the column may become a plan in space, as far as the members are concerned.
@@ -104,7 +105,7 @@ class Reservation:
         was kept away from it by its plan before. It need not agree again, if its newest plan is away as well.
         """
         missing = self._agreements.missing()
-        return not missing or (self._was_reserved and self._agreements.clear(missing))
+        return not missing or (self.was_reserved and self._agreements.clear(missing))
 
     def _lasts(self, now: int) -> bool:
         """Return whether at the last ``watch`` nothing had been missing for long enough at ``now`` (µs).

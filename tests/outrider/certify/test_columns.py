@@ -6,6 +6,7 @@ import pytest
 
 from mavlink_bridge.wire.agreements import Entry, Statement
 from mavlink_bridge.wire.plan import Integers, WirePlan
+from outrider.certify.command import show
 from outrider.certify.evidence import Evidence, LoggedStatement, Order
 from outrider.certify.verdict import Verdict, judge
 from tests.outrider.certify.evidence import BEGAN, EPOCH, TERMS, evidence, on, restated, standing, turned
@@ -146,6 +147,32 @@ def test_a_column_may_be_left_beside_one_that_begins_anew_if_that_is_away(
         one.figures for one in findings if one.what == "a plan without an agreement" and one.who[0] == 11
     ]
     assert found == ([] if figures is None else [figures])
+
+
+@pytest.mark.parametrize("late", [2, 4, 5])
+def test_a_late_step_does_not_end_a_reservation(late: int) -> None:
+    """11 announces no plan of the epoch ``late``; from the epoch 5 on 12 has begun anew."""
+    own = [plan for plan in climbing() if plan.epoch != at(late)]
+    anew = [on(BESIDE if k < 5 else standing((3.0, 0.0, 5.0)), k) for k in range(EPOCHS)]
+
+    def unheard(one: LoggedStatement) -> Statement:
+        said = one.statement
+        if said.epoch < at(5):
+            return said
+        if one.sender == 12:
+            return said._replace(since=at(5), entries=(Entry(11),))
+        return said._replace(entries=(Entry(12, considered=(at(3),) * 2),))
+
+    findings = judge(restated(evidence({11: own, 12: anew}, WIDE), unheard)).findings
+    assert "a plan without an agreement" not in {one.what for one in findings if one.who[0] == 11}
+
+
+def test_table_and_json_count_the_same_plans(capsys: pytest.CaptureFixture[str]) -> None:
+    """The first plan, and the one in space that the column becomes."""
+    verdict = judge(evidence({11: climbing()}, WIDE))
+    show("run", verdict)
+    (row,) = (line for line in capsys.readouterr().out.splitlines() if "plans made" in line)
+    assert row.replace("│", "").split()[-1] == str(verdict.document()["plans"]) == "2"
 
 
 def test_a_climb_without_a_column_is_found() -> None:

@@ -11,14 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.avoidance.certified.margins import between
+from companion.flight.autopilots.ardupilot import ARDUPILOT
 from mavlink_bridge.messages import Source, Tunnel
 from mavlink_bridge.network.channel import Faults
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.preflight import MOST, LinkReport, Report, pack
+from outrider.preflight.autopilot import AutopilotFigures
 from outrider.preflight.findings import Result
 from outrider.preflight.judgement import judge
 from outrider.preflight.node import Preflight
+from outrider.preflight.own_checks import own_checks
 from outrider.preflight.terms import Terms
 from outrider.preflight.tube import TrackingError
 from outrider.scenarios.fleet_file import FleetFile, text_of
@@ -201,6 +204,30 @@ def test_a_drift_that_was_not_measured_is_noted_with_that_of_wind() -> None:
     assert noted.result is Result.NOTE
     for word in ("0.5 m counts", "not measured", "5 m/s of wind", "--fly"):
         assert word in noted.text
+
+
+@pytest.mark.parametrize(
+    ("tube", "flown", "result"),
+    [
+        (None, 1.0, Result.PASS),
+        (None, 0.1, Result.FAIL),
+        (0.3, 0.1, Result.FAIL),
+        (0.9, 0.1, Result.PASS),
+        (0.9, None, Result.PASS),
+        (0.3, 1.0, Result.FAIL),
+    ],
+)
+def test_a_drift_is_compared_with_the_tube_of_the_fleet_file(
+    tube: float | None, flown: float | None, result: Result
+) -> None:
+    """0.8 m: others allow the drift of the file, or the tube if that is larger: stated, else measured."""
+    stated = {} if tube is None else {"tube": tube}
+    autopilot = AutopilotFigures(Source(1, 191), planar=False, utc=False)
+    autopilot.profile = ARDUPILOT
+    error = None if flown is None else FLOWN._replace(largest=flown)
+    config = companion(certified={"drift": 0.5, **stated})
+    checks = own_checks(1, config, autopilot, 1000, error, 0.8, doubled=False)
+    assert [one.result for one in checks if one.name == "drift"] == [result]
 
 
 def test_a_gentle_flight_says_nothing_about_the_tube() -> None:

@@ -54,7 +54,7 @@ def show(name: str, verdict: Verdict) -> None:
         "required, m": f"{verdict.required:.4f}",
         "agreements": verdict.agreements,
         "plans checked against their planes": verdict.kept,
-        "plans made": len(verdict.steps(Kind.FIRST, Kind.MADE, Kind.ANCHOR)),
+        "plans made": verdict.plans,
         "plans carried on": len(verdict.steps(Kind.CARRIED_ON)),
         "anchors": len(anchors),
         "farewells": sum(len(history.leaves) for history in verdict.histories),

@@ -10,7 +10,7 @@ from companion.avoidance.certified.separating_planes import hull_distance
 from mavlink_bridge.wire.agreements import Epochs
 from mavlink_bridge.wire.plan import WirePlan
 from outrider.certify.evidence import Finding, Order, Terms
-from outrider.certify.histories import History
+from outrider.certify.histories import History, Kind
 
 _SLACK_US = 20_000
 """Time (µs) by which a record may be written after the step of the companion to which it belongs."""
@@ -101,12 +101,17 @@ class Reservations:
         There is no agreement with ``system``. Its newest plan must be away from the column, and the column
         must have been reserved before.
         """
-        begins = epoch
-        while begins - self._terms.epoch in self._columns:
-            begins -= self._terms.epoch
+        own: WirePlan | None = None
+        for step in reversed(self._steps):
+            # In a gap the plan before is carried on: a step that was late makes none.
+            if step.plan.epoch < epoch:
+                if not step.plan.column:
+                    break
+                own = step.plan
+                if step.kind is Kind.ANCHOR:
+                    break
         newest = None if system not in self._peers else self._peers[system].newest
-        own = next((step.plan for step in self._steps if step.plan.epoch == begins), None)
-        if own is None or not own.column or self._last < begins:
+        if own is None or self._last < own.epoch:
             return "its column was not reserved"
         if newest is None:
             return "no plan of it was received"

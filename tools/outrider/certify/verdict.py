@@ -45,6 +45,11 @@ class Verdict(NamedTuple):
         found = [(h.system, s.plan.epoch) for h in self.histories for s in h.steps if s.kind in kinds]
         return sorted(found, key=lambda one: one[::-1])
 
+    @property
+    def plans(self) -> int:
+        """Number of plans that were not carried on, anchors among them."""
+        return len(self.steps(Kind.FIRST, Kind.MADE, Kind.RELEASED, Kind.ANCHOR))
+
     def line(self, finding: Finding) -> str:
         """Return a finding as text: kind, vehicles, time, figures."""
         who = ", ".join(map(str, finding.who))
@@ -70,7 +75,7 @@ class Verdict(NamedTuple):
             "required_m": self.required,
             "agreements": self.agreements,
             "planes_checked": self.kept,
-            "plans": len(self.steps(Kind.FIRST, Kind.MADE, Kind.RELEASED, Kind.ANCHOR)),
+            "plans": self.plans,
             "carried_on": len(self.steps(Kind.CARRIED_ON)),
             "anchors": len(self.steps(Kind.ANCHOR)),
             "farewells": sum(len(history.leaves) for history in self.histories),

@@ -138,13 +138,17 @@ def _tube(subject: str, config: CompanionConfig, flown: TrackingError | None) ->
 
 
 def _drift(subject: str, config: CompanionConfig, flown: TrackingError | None, drift: float | None) -> Check:
-    """Compare the drift with what others allow for a column: ``certified.drift``, or the tube."""
+    """Compare the drift with what others allow for a column: ``certified.drift``, or the tube.
+
+    The tube is that of the fleet file: the one that is stated, or measured.
+    """
     allowed = config.certified.drift
+    tube = config.certified.tube if flown is None or stated_at(config, TUBE) else flown.largest
     if drift is None:
         text = f"{allowed:g} m counts in take-off and landing, not measured; {_IN_WIND}; --fly measures it"
         return Check(subject, "drift", Result.NOTE, text)
     text = f"{drift:.2f} m from its column at most in take-off and landing, in the wind of today"
-    if drift > max(allowed, 0.0 if flown is None else flown.largest):
+    if drift > max(allowed, tube):
         text += f"; more than certified.drift, {allowed:g} m: state {ceil(10.0 * drift) / 10.0:g} or more"
         return Check(subject, "drift", Result.FAIL, text)
     return Check(subject, "drift", Result.PASS, text)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from companion.avoidance.certified import constraint_sources
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.columns import Distances
+from companion.avoidance.certified.commitment import HoldReason
 from companion.avoidance.certified.committed import resting
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.negotiation import Negotiation
@@ -22,7 +23,7 @@ from companion.config import CompanionConfig
 from companion.values.components import COMPONENT
 from companion.values.horizon import Array, Motion
 from mavlink_bridge.errors import PlanWireError
-from mavlink_bridge.messages import Source
+from mavlink_bridge.messages import Source, Tunnel
 from mavlink_bridge.wire.agreements import Statement, unpack
 from mavlink_bridge.wire.plan import pack
 from tests.companion.avoidance.certified.draws import delays, losses
@@ -189,20 +190,32 @@ def test_who_can_meet_a_column_is_near_or_unknown(x: float | None, clear: bool) 
     assert one.clear({OTHER}) is clear
 
 
-def test_a_column_that_was_never_reserved_waits_for_all_agreements() -> None:
-    """Another controller took the vehicle off: planes may be kept that are not upright."""
-    for reserved in (False, True):
-        flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
-        stands = Motion(np.zeros(3), np.zeros(3), np.zeros(3))
-        for now in range(EPOCH, EPOCH + 4 * LENGTH, LENGTH):
-            if reserved:
-                flight.park(now, stands, joins=True)
-            else:
-                flight.reservation.begin(now, stands.position, joins=True)
-        far = resting(now, DT, STEPS, (9.0, 0.0, 0.0), FLEET.fingerprint)
-        flight.agreements.receive_plan(now, OTHER, pack(far))
-        assert flight.agreements.missing() == {OTHER}
-        assert flight.reservation.may_be_left() is reserved
+@pytest.mark.parametrize(("reserved", "x"), [(False, 9.0), (True, 9.0), (True, 1.0)])
+def test_a_column_waits_for_all_agreements_if_it_was_never_reserved_or_another_may_meet_it(
+    reserved: bool, x: float
+) -> None:
+    """Another controller took the vehicle off, so that planes may be kept that are not upright; or the plan
+    of one that begins anew, at ``x`` (m), is too near."""
+    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    stands = Motion(np.zeros(3), np.zeros(3), np.zeros(3))
+    for now in range(EPOCH, EPOCH + 4 * LENGTH, LENGTH):
+        if reserved:
+            flight.park(now, stands, joins=True)
+        else:
+            flight.reservation.begin(now, stands.position, joins=True)
+    begun = resting(now, DT, STEPS, (x, 0.0, 0.0), FLEET.fingerprint)
+    flight.agreements.receive_plan(now, OTHER, pack(begun))
+    assert flight.agreements.missing() == {OTHER}
+    assert flight.reservation.may_be_left() is (reserved and x > 2.0)
+
+
+def test_a_column_that_is_begun_elsewhere_has_not_been_reserved() -> None:
+    """It was moved on the ground: what the others keep is the column before."""
+    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    for number, x in enumerate((0.0, 0.0, 0.0, 0.0, 3.0)):
+        stands = Motion(np.array([x, 0.0, 0.0]), np.zeros(3), np.zeros(3))
+        flight.park(EPOCH + number * LENGTH, stands, joins=True)
+        assert flight.reservation.was_reserved is (number in (2, 3))
 
 
 def test_who_does_not_take_off_is_passed_and_is_not_waited_for() -> None:
@@ -283,6 +296,112 @@ def test_how_far_a_vehicle_is_from_its_plan_is_judged_by_the_plan_of_the_epoch(c
     assert flight.deviation == pytest.approx(0.0 if column else 1.0, abs=1e-3)
 
 
+class Above:
+    """1 hovers, and 2 above it or beside it at ``place`` (3,), m; what they send arrives unless ``lost``."""
+
+    def __init__(self, place: Array) -> None:
+        config = CompanionConfig(avoidance="certified")
+        self.places = {OWN: np.array([0.0, 0.0, 5.0]), OTHER: place}
+        self.flights = {s: CertifiedFlight(config, Source(s, COMPONENT), FLEET) for s in self.places}
+        self.now, self.lost = EPOCH, False
+        for system, flight in self.flights.items():
+            flight.stand(self.now, self.places[system])
+
+    def step(self, handle: Callable[[CertifiedFlight, int], bool]) -> None:
+        """1 is handled by ``handle``, which returns whether it says farewell; 2 hovers."""
+        self.now += 20_000
+        one, two = self.flights.values()
+        sent = one.messages(self.now, farewell=handle(one, self.now))
+        hover(two, self.now)
+        for receiver, messages in ((two, sent), (one, two.messages(self.now))):
+            for message in messages:
+                if isinstance(message, Tunnel) and not self.lost:
+                    receiver.receive(self.now, message)
+
+    def run(self, handle: Callable[[CertifiedFlight, int], bool], steps: int = 100) -> None:
+        for _ in range(steps):
+            self.step(handle)
+
+    def missing(self) -> set[int]:
+        return set().union(*(flight.agreements.missing() for flight in self.flights.values()))
+
+
+def hover(flight: CertifiedFlight, now: int) -> bool:
+    if flight.due(now):
+        flight.commitment.carry_on(HoldReason.MISSING)
+    return False
+
+
+def lowers(flight: CertifiedFlight, now: int) -> bool:
+    assert flight.lower(now)
+    return False
+
+
+def sinks(flight: CertifiedFlight, now: int) -> bool:
+    flight.descend(now)
+    return True
+
+
+def given_back(flight: CertifiedFlight, now: int) -> bool:
+    """It has sunk by a metre."""
+    if flight.commitment.column:
+        flight.leave_column(now, Motion(np.array([0.0, 0.0, 4.0]), np.zeros(3), np.zeros(3)), flies=True)
+        return False
+    return hover(flight, now)
+
+
+@pytest.mark.parametrize("pilot", [False, True], ids=["at once", "after a pilot"])
+@pytest.mark.parametrize("heard", [False, True], ids=["farewell lost", "farewell heard"])
+def test_after_a_stopped_landing_without_a_reservation_all_agree_again(pilot: bool, heard: bool) -> None:
+    """3 m above each other no column can be agreed on, and none may be left without an agreement."""
+    pair = Above(np.array([0.3, 0.0, 8.0]))
+    one = pair.flights[OWN]
+    one.reservation.joined = True
+    pair.run(hover)
+    assert not pair.missing()
+    pair.lost = not heard
+    pair.run(sinks, 30)
+    if pilot:
+        pair.run(lambda flight, now: False, 30)
+    pair.lost = False
+    one.stand(pair.now, np.array([0.1, 0.0, 4.0]))
+    assert not one.commitment.column
+    pair.run(given_back)
+    assert not pair.missing()
+
+
+@pytest.mark.parametrize("pilot", [False, True], ids=["at once", "after a pilot"])
+def test_after_a_stopped_landing_a_reserved_column_goes_on(pilot: bool) -> None:
+    """The others keep it, whether they have heard of the farewell or not; it is left when all agree."""
+    pair = Above(np.array([9.0, 0.0, 8.0]))
+    one = pair.flights[OWN]
+    one.reservation.joined = True
+    pair.run(hover)
+    pair.run(lowers)
+    assert not one.reservation.missing(pair.now)
+    pair.run(sinks, 30)
+    if pilot:
+        pair.run(lambda flight, now: False, 30)
+    one.stand(pair.now, np.array([0.1, 0.0, 4.0]))
+    assert one.commitment.column
+    assert one.commitment.anchored_anew == 0
+    pair.run(given_back)
+    assert not pair.missing()
+    assert not one.commitment.column
+
+
+def test_a_column_that_waits_for_its_reservation_goes_on_while_its_agreements_last() -> None:
+    """The mode changes for a moment: nothing is void, and the others may have agreed on the column."""
+    pair = Above(np.array([9.0, 0.0, 8.0]))
+    pair.run(hover)
+    pair.lost = True
+    pair.run(lowers)
+    one = pair.flights[OWN]
+    assert one.reservation.missing(pair.now)
+    one.stand(pair.now, pair.places[OWN])
+    assert one.commitment.column
+
+
 def farewells(swarm: Swarm) -> list[Statement]:
     found = []
     for payload in swarm.sent:
@@ -316,7 +435,7 @@ def ignore_the_column(patch: pytest.MonkeyPatch) -> None:
 
 
 def agree_nearer_than_allowed(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Agreements, "near", lambda self, plans=None: set())
+    patch.setattr(Agreements, "near", lambda self, plans=None, column=None: set())
     patch.setattr(Negotiation, "_reservable", lambda self, newest, plans: True)
 
 
