@@ -119,7 +119,7 @@ class Flight:
         try:
             from pandas import DataFrame
         except ModuleNotFoundError:
-            raise OutriderError("to_pandas needs pandas: pip install 'outrider[pandas]'") from None
+            raise OutriderError("to_pandas needs pandas: pip install pandas") from None
         count, motion = len(self.systems), self._motion
         columns: dict[str, Any] = {
             "time_s": np.repeat(motion.time_s, count),

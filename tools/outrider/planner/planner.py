@@ -64,6 +64,8 @@ class Planner:
             raise InputError(f"config: is a {type(config).__name__}; allowed: a PlannerConfig")
         if config.avoidance == "certified" and methods:
             raise InputError("methods: committed plans use none; allowed: avoidance 'field', or no methods")
+        if config.moving:
+            raise InputError("moving: these obstacles send messages; allowed: none; give `obstacles` to step")
         # Both wait for messages that a planner without links does not get.
         self.config = config = config.model_copy(
             update={
