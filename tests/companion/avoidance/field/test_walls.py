@@ -12,7 +12,7 @@ from companion.avoidance.field.walls import Walls
 from companion.config import CompanionConfig
 from companion.values.horizon import roll_out
 from companion.values.obstacles import Obstacles
-from tests.companion.rig import LAWS, QUICK, ZERO, numbers, vectors
+from tests.companion.rig import LAWS, QUICK, ZERO, vectors
 from tests.scenarios.adversary import shipped
 
 STEPS, DT = 16, 100_000
