@@ -151,11 +151,14 @@ def test_plans_come_back_as_they_went(by_mavsdk: Flight) -> None:
     for kind, items in (("mission", (3, 4)), ("fence", (3,)), ("rally", (1,))):
         up, down = by_mavsdk[kind]["up"], by_mavsdk[kind]["down"]
         assert len(up) in items
-        assert [_without_current(item) for item in down] == [_without_current(item) for item in up]
+        assert [_plan(item) for item in down] == [_plan(item) for item in up]
 
 
-def _without_current(item: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in item.items() if name != "current"}
+def _plan(item: dict[str, Any]) -> dict[str, Any]:
+    """Return the item without what changes in flight, and to a millimetre: ArduPilot's item 0 is always its home."""
+    found = {name: round(value, 3) if isinstance(value, float) else value for name, value in item.items()}
+    del found["current"]
+    return found
 
 
 def test_takeoff_leads_to_the_height_that_was_set(by_mavsdk: Flight) -> None:

@@ -1,6 +1,6 @@
 """Companions with committed plans on emulated vehicles, in real time: whichever of their processes is killed
 or stopped, no two vehicles come nearer than d_min, and the logs certify it. These tests really wait; they
-assert no timing."""
+assert no timing, and are skipped if the machine stood still."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ import pytest
 
 from trials.certified import flown
 from trials.certified_plan import MIXED, PROCESSES, CertifiedPlan
+from trials.separation import STOOD_STILL
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("victim", PROCESSES)
 def test_separation_survives_a_process(victim: str, tmp_path: Path) -> None:
     found = flown(CertifiedPlan(MIXED, 3, victims=(victim,)), tmp_path)
-    assert found["faults"] == []
+    stood_still = [fault for fault in found["faults"] if fault.endswith(STOOD_STILL)]
+    assert found["faults"] == stood_still
+    if stood_still:
+        pytest.skip(stood_still[0])
     assert len(found["acts"]) == 2
     assert found["least_m"] > 0.5
 

@@ -15,6 +15,8 @@ _STEP = 0.005
 """Time between two samples (s); at 5 m/s that is 2.5 cm, and millimetres of distance at the nearest point."""
 GAP = 1.0
 """Longest interval between messages over which a position is interpolated (s)."""
+STOOD_STILL = "and the machine may have stood still"
+"""End of the fault of a trial that proves nothing, because positions are missing."""
 
 
 class Nearest(NamedTuple):
@@ -90,7 +92,7 @@ def blind(gap: float) -> list[str]:
     """Return a fault if the longest gap (s) is too long: distances during it are unknown."""
     if gap <= GAP:
         return []
-    return [f"nothing is known of a flying vehicle for {gap:.1f} s, and the machine may have stood still"]
+    return [f"nothing is known of a flying vehicle for {gap:.1f} s, {STOOD_STILL}"]
 
 
 def longest_gap(track: Track) -> float:
