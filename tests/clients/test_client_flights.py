@@ -155,7 +155,7 @@ def test_plans_come_back_as_they_went(by_mavsdk: Flight) -> None:
 
 
 def _plan(item: dict[str, Any]) -> dict[str, Any]:
-    """Return the item without what changes in flight, and to a millimetre: ArduPilot's item 0 is always its home."""
+    """Return the item without what changes, and to a millimetre: ArduPilot's item 0 is always its home."""
     found = {name: round(value, 3) if isinstance(value, float) else value for name, value in item.items()}
     del found["current"]
     return found
