@@ -37,6 +37,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_page_shows_all_and_says_what_became_of_each(here: Path) -> None:
     assert gallery(("traffic", "obstacles"), to=Path("page"), run="tests.outrider.gallery.runs:straight") == 1
     text = (here / "page" / "README.md").read_text()

@@ -64,6 +64,7 @@ def detections(path: Path) -> list[tuple[int, CameraTrackingGeo]]:
     return found
 
 
+@pytest.mark.slow
 def test_the_bytes_do_not_depend_on_processes_or_on_the_order_of_nodes(tmp_path: Path) -> None:
     of = scenario("walk", **SIGHT, sensors="rtk")
     _, logs = flown(of, tmp_path / "1")

@@ -158,6 +158,7 @@ def test_a_damaged_golden_file_is_an_assertion_in_words(data: bytes) -> None:
             unpacked(path)
 
 
+@pytest.mark.slow
 def test_another_gain_fails_the_golden_test_in_words(pytester: pytest.Pytester) -> None:
     """Made by a flag, it passes; with one gain changed it says where the set-points part, and by how much."""
     pytester.makepyfile(test_it=FLIGHT.replace("CHANGE", "{}"))
