@@ -136,6 +136,74 @@ def _jacobian(camera: Pinhole, seen: Extent, up: Vector, height: float) -> Array
     )
 
 
+class Sighting(NamedTuple):
+    """Place of an object relative to the camera: ``offset`` (m) and its covariance ``errors`` (3, 3), NED.
+
+    Accuracies are standard deviations, of what CAMERA_TRACKING_GEO_STATUS (276) says.
+    """
+
+    offset: Vector
+    errors: Array
+
+    @property
+    def level(self) -> float:
+        """Horizontal distance (m); at 0 there is no heading."""
+        return math.hypot(self.offset[0], self.offset[1])
+
+    @property
+    def distance(self) -> float:
+        """Distance (m)."""
+        return math.hypot(self.level, self.offset[2])
+
+    @property
+    def heading(self) -> float:
+        """Direction (rad, clockwise from north)."""
+        return math.atan2(self.offset[1], self.offset[0])
+
+    @property
+    def horizontal_accuracy(self) -> float:
+        """√(σ_along² + σ_across²), m."""
+        return _root(self.errors[0, 0] + self.errors[1, 1])
+
+    @property
+    def vertical_accuracy(self) -> float:
+        """Of the altitude, m."""
+        return _root(self.errors[2, 2])
+
+    @property
+    def heading_accuracy(self) -> float:
+        """Of the heading, rad."""
+        north, east, _ = self.offset
+        across = np.array((-east / self.level, north / self.level, 0.0))
+        return _root(across @ self.errors @ across) / self.level
+
+
+def sighting(
+    camera: Pinhole,
+    attitude: Quaternion,
+    seen: Extent,
+    height: float,
+    pixel_sigma: float,
+    height_sigma: float,
+) -> Sighting | None:
+    """Return where an object of known ``height`` (m) is, seen from a camera with that attitude.
+
+    Arguments as of ``covariance``. Returns None if no object in front of the camera looks like that.
+    """
+    up = upward(attitude)
+    place = foot(camera, seen, up, height)
+    if place is None:
+        return None
+    turn = matrix(attitude)
+    errors = turn @ covariance(camera, seen, up, height, pixel_sigma, height_sigma) @ turn.T
+    return Sighting(rotated(attitude, place), errors)
+
+
+def _root(square: float) -> float:
+    """Return the root of a sum of squares that rounding may have made negative."""
+    return math.sqrt(max(0.0, square))
+
+
 def upward(attitude: Quaternion) -> Vector:
     """Return the vertical, upward, in camera axes."""
     w, x, y, z = attitude

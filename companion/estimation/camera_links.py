@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from math import atan2, hypot, sqrt
 
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
@@ -20,7 +19,7 @@ from companion.estimation.tracks import State
 from companion.values.horizon import Array
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo, CameraTrackingImage, Source
-from mavlink_bridge.pinhole import Extent, Pinhole, covariance, foot, matrix, rotated, upward
+from mavlink_bridge.pinhole import Extent, Pinhole, sighting
 
 CAMERA_MESSAGES = (CameraFovStatus, CameraTrackingGeo, CameraTrackingImage)
 CameraMessage = CameraFovStatus | CameraTrackingGeo | CameraTrackingImage
@@ -118,21 +117,11 @@ class CameraLinks:
         camera = Pinhole.of_field(_WIDTH, max(height, 1), fields[0])
         left, top, right, bottom = rectangle
         seen = Extent(0.5 * (left + right) * _WIDTH, top * height, bottom * height)
-        up = upward(view.attitude)
-        found = foot(camera, seen, up, source.height)
-        if found is None:
+        sigmas = source.sigma_row * height, source.sigma_height
+        found = sighting(camera, view.attitude, seen, source.height, *sigmas)
+        if found is None or found.level == 0.0:
             return None
-        north, east, down = rotated(view.attitude, found)
-        level = hypot(north, east)
-        if level == 0.0:
-            return None
-        turn = matrix(view.attitude)
-        errors = (
-            turn
-            @ covariance(camera, seen, up, source.height, source.sigma_row * height, source.sigma_height)
-            @ turn.T
-        )
-        across = np.array((-east / level, north / level, 0.0))
+        north, east, down = found.offset
         start = np.array(self._fleet.to_east_north_up(*place))
         where = self._fleet.to_geodetic(start + np.array([east, north, -down]))
         return CameraTrackingGeo(
@@ -140,10 +129,10 @@ class CameraLinks:
             message.status,
             *where,
             None,
-            horizontal_accuracy=sqrt(errors[0, 0] + errors[1, 1]),
-            vertical_accuracy=sqrt(errors[2, 2]),
-            distance=hypot(level, down),
-            heading=atan2(east, north),
-            heading_accuracy=sqrt(float(across @ errors @ across)) / level,
+            horizontal_accuracy=found.horizontal_accuracy,
+            vertical_accuracy=found.vertical_accuracy,
+            distance=found.distance,
+            heading=found.heading,
+            heading_accuracy=found.heading_accuracy,
             device=message.device,
         )

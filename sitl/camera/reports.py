@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import (
@@ -17,17 +15,7 @@ from mavlink_bridge.messages import (
     Source,
     Vector,
 )
-from mavlink_bridge.pinhole import (
-    Extent,
-    Pinhole,
-    Quaternion,
-    covariance,
-    foot,
-    matrix,
-    product,
-    rotated,
-    upward,
-)
+from mavlink_bridge.pinhole import Extent, Pinhole, Quaternion, product, sighting
 from sitl.values.attitudes import euler, quaternion
 from sitl.values.camera import CameraConfig
 
@@ -72,30 +60,23 @@ def geo_status(
     The accuracies are those of the camera alone. They do not contain the errors of the estimated pose, which
     all images of some seconds have in common.
     """
-    up, known = upward(pose.attitude), config.object
-    place = foot(camera, seen, up, known.height)
-    if place is None:
+    known = config.object
+    found = sighting(camera, pose.attitude, seen, known.height, config.pixel_sigma, known.height_sigma)
+    if found is None:
         return None
-    north, east, down = offset = rotated(pose.attitude, place)
-    x, y, z = (a + b for a, b in zip(pose.place, offset, strict=True))
+    x, y, z = (a + b for a, b in zip(pose.place, found.offset, strict=True))
     latitude, longitude, altitude = geodetic((x, y, z))
     said = CameraTrackingGeo(
         source, mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE, latitude, longitude, altitude, None
     )
-    level = math.hypot(north, east)
-    if not config.accuracy or level == 0.0:
+    if not config.accuracy or found.level == 0.0:
         return said
-    turn = matrix(pose.attitude)
-    errors = (
-        turn @ covariance(camera, seen, up, known.height, config.pixel_sigma, known.height_sigma) @ turn.T
-    )
-    across = np.array((-east / level, north / level, 0.0))
     return said._replace(
-        horizontal_accuracy=_root(errors[0, 0] + errors[1, 1]),
-        vertical_accuracy=_root(errors[2, 2]),
-        distance=math.hypot(level, down),
-        heading=math.atan2(east, north),
-        heading_accuracy=_root(across @ errors @ across) / level,
+        horizontal_accuracy=found.horizontal_accuracy,
+        vertical_accuracy=found.vertical_accuracy,
+        distance=found.distance,
+        heading=found.heading,
+        heading_accuracy=found.heading_accuracy,
     )
 
 
@@ -118,8 +99,3 @@ def image_status(source: Source, config: CameraConfig, camera: Pinhole, seen: Ex
         None,
         rectangle,
     )
-
-
-def _root(square: float) -> float:
-    """Return the root of a sum of squares that rounding may have made negative."""
-    return math.sqrt(max(0.0, square))
