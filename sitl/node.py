@@ -49,7 +49,7 @@ from sitl.autopilot.services import Services
 from sitl.autopilot.trust import SigningSetup
 from sitl.camera.camera import Camera
 from sitl.camera.scene import LINK as SIGHT
-from sitl.camera.scene import Scene
+from sitl.camera.scene import Scene, truth
 from sitl.camera.service import CameraService
 from sitl.config.autopilot import AutopilotConfig
 from sitl.environment.weather import WeatherConfig
@@ -59,7 +59,6 @@ from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
 from sitl.telemetry.streams import usual_rates
 from sitl.values.origin import Origin
-from sitl.values.setpoints import ZERO
 from sitl.vehicle.airframe import hover_speeds
 from sitl.vehicle.battery import Battery
 from sitl.vehicle.config import VehicleConfig
@@ -282,10 +281,9 @@ class Autopilot:
             return []
         self._next_shown = self._now + _SHOWN_US
         plant = self._plant
-        latitude, longitude, altitude = self._origin.site.to_geodetic(ned_to_enu(plant.state.position))
-        time = plant.time + (self._boot or 0)
-        truth = HilState(self._source, time, latitude, longitude, altitude, ZERO)
-        return [Datagram(SIGHT, self._truth_codec.encode(truth))]
+        place, time = ned_to_enu(plant.state.position), plant.time + (self._boot or 0)
+        said = truth(self._source, time, place, self._origin.site)
+        return [Datagram(SIGHT, self._truth_codec.encode(said))]
 
     def _receive(self, datagram: Datagram) -> None:
         if datagram.link == SIGHT and self.camera is not None:

@@ -10,8 +10,10 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
+import numpy.typing as npt
+
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import HilState
+from mavlink_bridge.messages import HilState, Source
 from sitl.camera.occlusion import Body, Point
 
 LINK: Final = "sight"
@@ -32,6 +34,11 @@ class Scene(NamedTuple):
     target: int | None = None
     fixed: tuple[Body, ...] = ()
     moving: Mapping[int, Body] = {}
+
+
+def truth(source: Source, time: int, place: npt.ArrayLike, frame: FleetFrame) -> HilState:
+    """Return the message that ``source`` is at ``place`` (3,), m, ENU of ``frame``, at ``time`` (µs)."""
+    return HilState(source, time, *frame.to_geodetic(place), (0.0, 0.0, 0.0))
 
 
 class Sightings:

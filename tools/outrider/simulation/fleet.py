@@ -185,9 +185,10 @@ class Fleet:
         """Return what the camera of vehicle ``k`` may see; None if no vehicle has a camera."""
         if not self.has_cameras:
             return None
-        scenario, radius = self.scenario, 0.5 * self.vehicle.span
-        others = {system: radius for system in self.systems if system != self.systems[k]}
-        return sight.scene(self.target_system, scenario.obstacles, scenario.moving_known, others)
+        scenario, others = self.scenario, set(self.systems) - {self.systems[k]}
+        return sight.scene(
+            self.target_system, scenario.obstacles, scenario.moving_known, sorted(others), self.vehicle
+        )
 
     def shown(self, target: Target, moving: Sequence[MovingObstacle]) -> list[Node]:
         """Return the nodes of target and obstacles, such that cameras see them if there are any."""

@@ -5,22 +5,23 @@ No companion is on the link ``sight``. It has no faults, and its messages do not
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config.companion import Moving, Obstacle
 from companion.config.obstacles import MovingSphere, Sphere
 from mavlink_bridge.frames import FleetFrame, ned_to_enu
-from mavlink_bridge.messages import HilState, Source
+from mavlink_bridge.messages import Source
 from mavlink_bridge.network.simulated import Channel, Faults
 from mavlink_bridge.node import Datagram, Node
 from mavlink_bridge.wire.codec import Codec
 from outrider.scene.camera_view import NO_VIEW, Single, view_row
 from outrider.simulation.paths import Array
 from sitl.camera.occlusion import Ball, Body, Column, Ground, Point
-from sitl.camera.scene import LINK, Scene
+from sitl.camera.scene import LINK, Scene, truth
 from sitl.node import Autopilot
+from sitl.vehicle.config import VehicleConfig
 
 CHANNEL = "sight"
 DELAY_US = 20_000
@@ -50,9 +51,8 @@ class Shown:
         place = self._place(now)
         if place is None:
             return said
-        latitude, longitude, altitude = self._fleet.to_geodetic(place)
-        truth = HilState(self._source, now, latitude, longitude, altitude, _HERE)
-        return [*said, Datagram(LINK, self._codec.encode(truth))]
+        shown = truth(self._source, now, place, self._fleet)
+        return [*said, Datagram(LINK, self._codec.encode(shown))]
 
 
 def channel(members: Sequence[str]) -> Channel:
@@ -61,13 +61,19 @@ def channel(members: Sequence[str]) -> Channel:
 
 
 def scene(
-    target: int, obstacles: Sequence[Obstacle], moving: Sequence[Moving], vehicles: Mapping[int, float]
+    target: int,
+    obstacles: Sequence[Obstacle],
+    moving: Sequence[Moving],
+    others: Iterable[int],
+    vehicle: VehicleConfig,
 ) -> Scene:
-    """Return what cameras may see.
+    """Return what the camera of one vehicle may see.
 
-    ``target``: system id of the tracked object; ``vehicles``: radii (m) of the vehicles, by system id.
+    ``target``: system id of the tracked object; ``others``: those of the other vehicles, which are of the
+    type ``vehicle``, too.
     """
-    bodies: dict[int, Body] = {system: Ball(_HERE, radius) for system, radius in vehicles.items()}
+    ball = Ball(_HERE, 0.5 * vehicle.span)
+    bodies: dict[int, Body] = dict.fromkeys(others, ball)
     for one in moving:
         if isinstance(one, MovingSphere):
             bodies[one.system] = Ball(_HERE, one.radius)

@@ -114,9 +114,8 @@ class Request:
         vehicle, scene = self.vehicle, None
         if self.camera is not None:
             vehicle = vehicle.model_copy(update={"camera": self.camera.camera})
-            radius, own = 0.5 * vehicle.span, self.first_id + index
-            others = {system: radius for system in self.systems if system != own}
-            scene = sight.scene(self.target_system, self.camera.obstacles, (), others)
+            others = set(self.systems) - {self.first_id + index}
+            scene = sight.scene(self.target_system, self.camera.obstacles, (), sorted(others), self.vehicle)
         return Autopilot(
             self._config(index, epoch),
             vehicle,
