@@ -18,7 +18,7 @@ from companion.values.horizon import Array, Motion
 from companion.values.mates import Mates, Sight
 from companion.values.obstacles import Obstacles
 from companion.world import View
-from outrider.planner.arrays import checked
+from outrider.arguments import checked
 
 TARGET = 0
 """Id of the target among obstacles; no vehicle has it."""

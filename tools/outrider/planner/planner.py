@@ -24,15 +24,18 @@ from companion.world import View, World
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Source
 from mavlink_bridge.wire.codec import Codec
+from outrider.arguments import checked, number, system_id
 from outrider.errors import InputError
-from outrider.planner.arrays import checked, number, system_id
 from outrider.planner.guided_pilot import GuidedPilot
 from outrider.planner.own_parts import OwnGoals, OwnMethods, OwnSurface
 from outrider.planner.surroundings import Surroundings
 from outrider.planner.values import Neighbour, Obstacle, Plan, Setpoint, Step, Target, microseconds
 
 Neighbours = Sequence[Neighbour] | Array
-"""Neighbours, or an array (M, 6) of their positions (m) and velocities (m/s); row k has the id k + 1."""
+"""Neighbours, or an array (M, 6) of their positions (m) and velocities (m/s).
+
+Rows have the ids 1, 2, … in turn, without the planner's own.
+"""
 Obstacles = Sequence[Obstacle] | Array
 """Obstacles, or an array (M, 4) of centres and radii of balls at rest, m."""
 

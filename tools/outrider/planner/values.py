@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from companion.values.horizon import Array, Horizon, roll_out
-from outrider.planner.arrays import checked, number, system_id
+from outrider.arguments import checked, number, system_id
 
 _ZERO = (0.0, 0.0, 0.0)
 

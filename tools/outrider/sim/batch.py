@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from outrider.arguments import whole
 from outrider.errors import InputError
 from outrider.resources import find
 from outrider.sim.frames import enu_attitudes, forward_left_up, swapped, turned_yaw, yaw_of
@@ -50,10 +51,8 @@ class Batch:
         hovering: bool = True,
         ground: float = 0.0,
     ) -> None:
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-            raise InputError(f"count: is {count!r}; allowed: a whole number of at least 1")
+        self.count = count = whole("count", count, least=1)
         self.config = config = vehicle_config(vehicle)
-        self.count = count = int(count)
         self.dt = 1e-6 * config.physics_period
         """Length of a physics step, s."""
         self._ground = ground
@@ -98,15 +97,14 @@ class Batch:
         stop. ``wind`` (3,) or (K, 3): the air's velocity, m/s, ENU. Raises InputError for wrong shapes and
         values that are not finite; nothing has moved then.
         """
-        if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
-            raise InputError(f"steps: is {steps!r}; allowed: a whole number of at least 1")
+        steps = whole("steps", steps, least=1)
         rows = self._commands
         rows[:, 19:22] = swapped(_fitting("wind", wind, (self.count, 3), "m/s, ENU"))
         if commands is None:
             rows[:, 0] = STOPPED
         else:
             self._write(np.asarray(commands, dtype=np.float64))
-        advance_many(self._states, rows, self._airframe, int(steps))
+        advance_many(self._states, rows, self._airframe, steps)
         return self.positions
 
     def _write(self, commands: FloatArray) -> None:

@@ -77,16 +77,16 @@ class EscortVectorEnv(VectorEnv[NDArray[np.float32], FloatArray, NDArray[Any]]):
 
         An episode that had ended begins anew instead, with reward 0.
         """
-        begun = self._over.copy()
-        if begun.any():
+        batch, begun = self._batch, self._over.copy()
+        begins = bool(begun.any())
+        if begins:
             self._begin(begun)
-        batch = self._batch
-        kept = batch.save()[begun]
+            kept = batch.save()[begun]
         push = self._push * np.clip(np.asarray(actions, dtype=np.float64), -1.0, 1.0)
         if push.shape != (self.num_envs, 3):
             raise InputError(f"actions: has shape {push.shape}; allowed: ({self.num_envs}, 3)")
         batch.step(np.hstack([batch.positions, batch.velocities, push]), self._steps)
-        if begun.any():
+        if begins:
             # An episode that begins now has not been acted on.
             states = batch.save()
             states[begun] = kept

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from outrider.errors import InputError
+from outrider.arguments import checked
 from outrider.sim.batch import Batch
 from sitl.vehicle.airframe import FloatArray
 from sitl.vehicle.config import VehicleConfig
@@ -68,11 +68,13 @@ class Vehicle:
         if position is None:
             command = None
         else:
-            given = {"position": position, "velocity": velocity, "acceleration": acceleration}
-            for name, value in given.items():
-                if np.shape(value) != (3,):
-                    raise InputError(f"{name}: has shape {np.shape(value)}; allowed: (3,), east, north, up")
-            command = np.concatenate([*given.values(), [yaw, yaw_rate]])[None]
+            parts = (
+                checked("position", position, (3,), "m"),
+                checked("velocity", velocity, (3,), "m/s"),
+                checked("acceleration", acceleration, (3,), "m/s²"),
+                [yaw, yaw_rate],
+            )
+            command = np.concatenate(parts)[None]
         return np.ravel(self._batch.step(command, steps, wind=wind))
 
     def fail_rotor(self, rotor: int, left: float) -> None:

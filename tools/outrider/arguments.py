@@ -1,14 +1,15 @@
-"""Check of arrays from outside: shape, finite values, and one error that names the argument and its unit."""
+"""Checks of arguments from Python programs: each wrong one is one error that names it and what is allowed."""
 
 from __future__ import annotations
 
 from math import isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from companion.values.horizon import Array
 from outrider.errors import InputError
+
+Array = NDArray[np.float64]
 
 
 def checked(name: str, value: ArrayLike, shape: tuple[int | str, ...], unit: str) -> Array:
@@ -44,8 +45,15 @@ def number(name: str, value: float, unit: str, *, least: float | None = None) ->
     return found
 
 
+def whole(name: str, value: int, *, least: int, most: int | None = None) -> int:
+    """Return ``value`` if it is a whole number from ``least`` to ``most``; otherwise raise InputError."""
+    wrong = isinstance(value, bool) or not isinstance(value, int | np.integer)
+    if wrong or value < least or (most is not None and value > most):
+        bounds = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise InputError(f"{name}: is {value!r}; allowed: a whole number {bounds}")
+    return int(value)
+
+
 def system_id(name: str, value: int) -> int:
     """Return ``value`` if it is a vehicle's id, 1 to 255; otherwise raise InputError."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= 255:
-        raise InputError(f"{name}: is {value!r}; allowed: a whole number from 1 to 255")
-    return int(value)
+    return whole(name, value, least=1, most=255)
