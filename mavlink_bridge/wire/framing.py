@@ -87,17 +87,21 @@ class Incompatible(NamedTuple):
 
 def incompatible(data: bytes, start: int) -> Incompatible | None:
     """Return the incompatible frame at ``data[start]``, which ``frame_at`` found; None if it is cut off."""
-    size, flags = len(data) - start, data[start + 2]
-    ids = start + 5 + (4 if flags & _LONG_IDS else 1) + 1
-    body = ids + 3 + (5 if flags & _TARGETED else 0)
-    end = body + data[start + 1]
-    signature: int = mavlink.MAVLINK_SIGNATURE_BLOCK_LEN if flags & mavlink.MAVLINK_IFLAG_SIGNED else 0
-    length = end + 2 + signature - start
-    if length > size:
+    flags = data[start + 2]
+    length, signature = _lengths(data[start + 1], flags)
+    if length > len(data) - start:
         return None
-    extra = CRC_EXTRA.get(int.from_bytes(data[ids : ids + 3], "little"))
+    message_id, end = start + (10 if flags & _LONG_IDS else 7), start + length - signature - 2
+    extra = CRC_EXTRA.get(int.from_bytes(data[message_id : message_id + 3], "little"))
     checked = extra is not None and mcrf4xx(data[start + 1 : end] + extra) == data[end] | data[end + 1] << 8
     return Incompatible(length, checked)
+
+
+def _lengths(payload: int, flags: int) -> tuple[int, int]:
+    """Return the lengths (bytes) of a version 2 frame with ``flags`` and of its signature, which is in it."""
+    signature: int = mavlink.MAVLINK_SIGNATURE_BLOCK_LEN if flags & mavlink.MAVLINK_IFLAG_SIGNED else 0
+    ids = (3 if flags & _LONG_IDS else 0) + (5 if flags & _TARGETED else 0)
+    return 12 + ids + payload + signature, signature
 
 
 def frame_at(data: bytes, start: int) -> Frame | Flaw:
@@ -179,10 +183,7 @@ def claimed_length(data: bytes, start: int) -> int | None:
     """Return the frame length by the unverified header at ``data[start]``, or None if that is no header."""
     mark = data[start : start + 1]
     if mark == b"\xfd" and start + 3 <= len(data):
-        flags = data[start + 2]
-        signature: int = mavlink.MAVLINK_SIGNATURE_BLOCK_LEN * (flags & mavlink.MAVLINK_IFLAG_SIGNED)
-        ids = (3 if flags & _LONG_IDS else 0) + (5 if flags & _TARGETED else 0)
-        return 12 + ids + data[start + 1] + signature
+        return _lengths(data[start + 1], data[start + 2])[0]
     if mark == b"\xfe" and start + 2 <= len(data):
         return 8 + data[start + 1]
     return None
