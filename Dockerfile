@@ -12,7 +12,7 @@ COPY tools tools
 COPY config config
 RUN /opt/outrider/bin/pip install --no-deps --no-build-isolation .
 # The planner and the physics are compiled once, into the cache beside the packages.
-RUN /opt/outrider/bin/outrider swarm antipodal-8 --vehicles 2 --replan-hz 10 --out /tmp/first || test $? -eq 1
+RUN /opt/outrider/bin/outrider swarm antipodal-8 --vehicles 2 --replan-hz 10 --out "$(mktemp -d)" || test $? -eq 1
 
 FROM python:3.12-slim
 COPY --from=build /opt/outrider /opt/outrider

@@ -99,6 +99,5 @@ class PerceptionFormation:
         """
         known = sight.weights.get(system, 0.0 if sight.weights else None)
         if known is None or (known == 0.0 and system == self._system):
-            across, along = self._formation.accuracy(system)[::-1]
-            return float(weight(along, across, np.array([distance]))[0])
+            return float(weight(*self._formation.accuracy(system), np.array([distance]))[0])
         return known

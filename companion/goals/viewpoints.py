@@ -90,8 +90,8 @@ def aside(bearings: Array, weights: Array, prior: complex, size: float) -> Array
     if count < 2:
         return np.zeros(count)
     s = anisotropy(bearings, weights, prior)
-    along = np.real(np.conj(s) * np.exp(2j * bearings))
-    slope = np.abs(np.imag(np.conj(s) * np.exp(2j * bearings)))
+    turned = np.conj(s) * np.exp(2j * bearings)
+    along, slope = np.real(turned), np.abs(np.imag(turned))
     flat = (along > _SADDLE * weights) & (slope < size * np.abs(along))
     order = np.linspace(-1.0, 1.0, count)
     # The one in the middle of an odd number stays; the others move.

@@ -118,10 +118,10 @@ class Neighbours:
         self.closest = inf
         """m: least distance to a neighbour so far, by its messages; updated if ``guard.near`` is set."""
         self._brief = False
-        # Committed plans are received by the certified avoidance alone.
         self._keeps_mates = isinstance(config.formation, Perception)
         self._planned: dict[int, int] = {}
-        self._sees_no_plans = config.avoidance == "certified" and isinstance(config.formation, Perception)
+        # Committed plans are received by the certified avoidance alone.
+        self._sees_no_plans = config.avoidance == "certified" and self._keeps_mates
         # Moving obstacles: they may be larger than a vehicle and are not bound by its limits.
         self._moving_obstacles = {one.system for one in config.moving}
         self.relevance = RelevanceFilter(config)

@@ -109,8 +109,8 @@ class TcpCaller(StreamLink):
 class TcpListener(StreamLink):
     """Link of ``tcpin``: what is sent goes to every connected peer.
 
-    A peer that does not read what it is sent is not read from either, until it does: its requests wait in its
-    own system, and none is taken whose answer would be lost.
+    A peer that takes less than it is sent is read from twice a second only, and one that takes nothing not at
+    all: its requests wait in its own system, because their answers would be lost.
     """
 
     _waits_for_readers = True

@@ -97,6 +97,10 @@ class RequestDataStream(NamedTuple):
     start: int
 
 
+LONGEST_INTERVAL = 0x7FFF_FFFF
+"""µs: the longest interval (36 min) that MESSAGE_INTERVAL can state."""
+
+
 @message("MESSAGE_INTERVAL")
 class MessageInterval(NamedTuple):
     """MESSAGE_INTERVAL (244): ``interval`` in µs; −1: not sent; 0: no such message."""

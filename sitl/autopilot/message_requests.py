@@ -8,16 +8,14 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from mavlink_bridge.messages import Message, MessageInterval, RequestDataStream, Source
+from mavlink_bridge.messages import LONGEST_INTERVAL, Message, MessageInterval, RequestDataStream, Source
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.firmware import CommandRefusal, Firmware
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.streams import members
 
 _LAST_ID: Final = 0xFFFF
-# 36 min: the largest interval that fits into MESSAGE_INTERVAL.
 _SLOWEST_HEARTBEAT_US: Final = 1_000_000
-_MAX_INTERVAL_US: Final = 0x7FFFFFFF
 
 
 class Requests:
@@ -76,7 +74,7 @@ class Requests:
         if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not 0.0 <= interval <= _SLOWEST_HEARTBEAT_US:
             # All clients hear the same HEARTBEAT, and take the vehicle for lost without it.
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Interval refused: HEARTBEAT stays on")
-        wanted = min(round(interval), _MAX_INTERVAL_US)
+        wanted = min(round(interval), LONGEST_INTERVAL)
         if not self._telemetry.set_interval(int(message_id), wanted, order.now):
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Interval refused: no message {message_id:.0f}")
         return None

@@ -8,6 +8,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import (
+    LONGEST_INTERVAL,
     CameraInformation,
     CommandAck,
     CommandInt,
@@ -23,8 +24,6 @@ _UNSUPPORTED: Final[int] = mavlink.MAV_RESULT_UNSUPPORTED
 _INFORMATION: Final[int] = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
 _SENSOR_WIDTH_MM: Final = 6.4
 _SHORTEST_US: Final = 16_000
-_LONGEST_US: Final = 0x7FFF_FFFF
-# 36 min: the largest interval that fits into MESSAGE_INTERVAL.
 
 
 class CameraService:
@@ -90,7 +89,7 @@ class CameraService:
             return _DENIED
         camera.tracking = interval >= 0.0
         if camera.tracking:
-            camera.interval = min(round(interval), _LONGEST_US) or camera.config.period
+            camera.interval = min(round(interval), LONGEST_INTERVAL) or camera.config.period
         return _ACCEPTED
 
 
