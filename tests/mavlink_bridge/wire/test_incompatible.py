@@ -59,9 +59,7 @@ def test_nothing_inside_is_received_and_all_around_is(frames, cuts):
 
 
 @given(
-    parts=st.lists(
-        st.one_of(FRAMES, st.just(OUTER), st.just(SHORTENED), st.binary(max_size=20)), max_size=5
-    )
+    parts=st.lists(st.one_of(FRAMES, st.just(OUTER), st.just(SHORTENED), st.binary(max_size=20)), max_size=5)
 )
 def test_a_log_skips_what_a_link_skips(parts, tmp_path_factory):
     data = b"".join(parts)
