@@ -43,6 +43,9 @@ TERMS = {
     "d_min_target_m": Term("d_min to the target", "m", ""),
     "d_min_obstacle_m": Term("d_min to obstacles", "m", ""),
     "span_m": Term("vehicle, tip to tip", "m", "two level vehicles nearer than this may touch"),
+    "motion": Term(
+        "motion", "", "multirotor: simulated physics; point: exactly as the set-points say, no physics"
+    ),
     "d_min_violations": Term("violations of d_min", "", "encounters, not samples"),
     "max_speed_m_s": Term("largest speed", "m/s", ""),
     "max_acceleration_m_s2": Term("largest acceleration", "m/s²", ""),

@@ -76,6 +76,7 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "d_min_m": scenario.d_min,
         "d_min_target_m": scenario.d_min_target,
         "span_m": flight.span,
+        "motion": flight.motion,
         "d_min_obstacle_m": scenario.d_min_obstacle if scenario.obstacles or scenario.moving else None,
         "d_min_violations": truth.vehicles.count + truth.target.count + truth.obstacles.count,
         "max_speed_m_s": _largest(np.linalg.norm(samples.velocity, axis=-1)),

@@ -125,6 +125,7 @@ class Flight:
                 sum(part.bad_frames for part in parts),
             ),
             plan_logs=[log for part in parts for log in part.plan_logs],
+            motion=self.fleet.vehicle.motion,
         )
 
     def snapshots(self, now: int) -> list[VehicleSnapshot]:
