@@ -130,6 +130,13 @@ class FieldConfig(Potential):
     smoothing_us: int = Field(
         50_000, ge=0, le=2_000_000, description="time constant of the field's low-pass, µs; 0 for none"
     )
+    downwash: float = Field(
+        1.0,
+        ge=1.0,
+        le=20.0,
+        description="height over width of the ellipsoid in which the distance of two vehicles is measured:"
+        " differences in height are divided by it; 1: a ball. In certified mode the same for the fleet",
+    )
     position_sigma: float = Field(
         0.0, ge=0.0, le=5.0, description="m, σ of a vehicle's estimated position on its worst axis"
     )

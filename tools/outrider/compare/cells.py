@@ -10,8 +10,8 @@ from typing import Any
 
 from outrider.compare.comparison import Comparison, Row
 from outrider.compare.missions import folder_of
-from outrider.compare.scene import Places, Scene, scenario_of
-from outrider.errors import Fault, InputError
+from outrider.compare.scene import Places, Scene, document_of
+from outrider.errors import InputError
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.preparation import prepared
 from outrider.sweep.cells import Cell
@@ -34,9 +34,9 @@ def cells_of(comparison: Comparison, where: Path, rows: Sequence[Row], folder: P
     for number, row in enumerate(rows, 1):
         changed = overlay(base, {**comparison.set, **row.set})
         count = changed["vehicles"]
-        if comparison.missions is None:
-            read(json.dumps(changed).encode(), f"{where}: {row.label}", Scenario)
-        given = [] if folder is None else folder_of(folder, int(str(count)))
+        given = []
+        if folder is not None and comparison.missions is not None:
+            given = folder_of(folder, int(str(count)), comparison.missions.offset)
         scene = Scene(
             scenario=changed,
             measure=comparison.measure,
@@ -45,10 +45,10 @@ def cells_of(comparison: Comparison, where: Path, rows: Sequence[Row], folder: P
             missions=comparison.missions,
             given=tuple((_places(one.starts), _places(one.goals)) for one in given),
         )
-        try:
-            ready = prepared(scenario_of(scene, 1), f"{where}: {row.label}")
-        except ValueError as error:
-            raise InputError(Fault(str(where), f"{row.label}: {error}")) from None
+        place = f"{where}: {row.label}"
+        # Read like a file, for the same messages.
+        scenario = read(json.dumps(document_of(scene, 1)).encode(), place, Scenario)
+        ready = prepared(scenario, place)
         document, vehicle = scene.model_dump_json(), ready.vehicle.model_dump_json()
         key = hashlib.sha256(json.dumps([document, vehicle]).encode()).hexdigest()[:_KEY_LENGTH]
         found.append(

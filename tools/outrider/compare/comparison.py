@@ -39,6 +39,7 @@ class Missions(Part):
 
     low: Position = Field(description="m, ENU: lowest corner")
     high: Position = Field(description="m, ENU: highest corner")
+    offset: Position = Field((0.0, 0.0, 0.0), description="m, added to the places of mission files")
     apart: Length = Field(description="m, of any two starts and of any two goals, in the scene's measure")
 
     @model_validator(mode="after")

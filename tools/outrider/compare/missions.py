@@ -76,10 +76,11 @@ def _scatter(missions: Missions, measure: Measure, count: int, seed: int, of: St
     )
 
 
-def folder_of(path: Path, count: int) -> list[Mission]:
+def folder_of(path: Path, count: int, offset: Position = (0.0, 0.0, 0.0)) -> list[Mission]:
     """Return the missions of ``count`` vehicles in ``path``, in the order of the numbers in their names.
 
-    The files are in ``path`` or below it. Raises InputError for a file that is no mission, and without any.
+    The files are in ``path`` or below it. ``offset`` (m) is added to all places. Raises
+    InputError for a file that is no mission, and without any.
     """
     if not path.is_dir():
         raise InputError(f"--missions {path}: there is no such folder")
@@ -87,7 +88,7 @@ def folder_of(path: Path, count: int) -> list[Mission]:
     found = [mission for file in files if len((mission := read(file)).starts) == count]
     if not found:
         raise InputError(f"--missions {path}: {len(files)} files, but none has {count} vehicles")
-    return found
+    return [Mission(one.starts + offset, one.goals + offset) for one in found]
 
 
 def read(path: Path) -> Mission:

@@ -34,16 +34,20 @@ class Scene(BaseModel):
 
 def scenario_of(scene: Scene, seed: int) -> Scenario:
     """Return the scenario that a scene flies with ``seed``. Raises InputError if no mission can be drawn."""
+    return Scenario.model_validate_json(json.dumps(document_of(scene, seed)), strict=True)
+
+
+def document_of(scene: Scene, seed: int) -> dict[str, Any]:
+    """Return the values of the scenario that a scene flies with ``seed``; raises as ``scenario_of``."""
     if scene.given:
         starts, goals = scene.given[(seed - 1) % len(scene.given)]
         return _placed(scene.scenario, Mission(np.array(starts), np.array(goals)))
     if scene.missions is not None:
         return _placed(scene.scenario, drawn(scene.missions, scene.measure, scene.vehicles, seed))
-    return Scenario.model_validate_json(json.dumps(scene.scenario), strict=True)
+    return scene.scenario
 
 
-def _placed(scenario: dict[str, Any], mission: Mission) -> Scenario:
-    """Return the scenario with the starts and goals of ``mission``."""
+def _placed(scenario: dict[str, Any], mission: Mission) -> dict[str, Any]:
+    """Return the values of the scenario with the starts and goals of ``mission``."""
     points = {"kind": "points", "at": mission.starts.tolist(), "goals": mission.goals.tolist()}
-    changed = {**scenario, "task": "goto", "starts": points, "vehicles": len(mission.starts)}
-    return Scenario.model_validate_json(json.dumps(changed), strict=True)
+    return {**scenario, "task": "goto", "starts": points, "vehicles": len(mission.starts)}

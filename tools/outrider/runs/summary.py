@@ -74,6 +74,7 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "min_obstacle_distance_m": _finite(truth.obstacles.minimum),
         "min_target_distance_m": _finite(near_target),
         "d_min_m": scenario.d_min,
+        "downwash": config.field.downwash,
         "d_min_target_m": scenario.d_min_target,
         "span_m": flight.span,
         "motion": flight.motion,
