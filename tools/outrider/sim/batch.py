@@ -24,10 +24,13 @@ _DEFAULT_SPACING_M, _DEFAULT_HEIGHT_M = 3.0, 5.0
 
 
 def vehicle_config(vehicle: str | Path | VehicleConfig) -> VehicleConfig:
-    """Return the type of vehicle with this name, or from this file. Raises InputError."""
-    return (
+    """Return the type of vehicle with this name, or from this file. Raises InputError, also for a point."""
+    config = (
         vehicle if isinstance(vehicle, VehicleConfig) else load(find("vehicles", str(vehicle)), VehicleConfig)
     )
+    if config.motion == "point":
+        raise InputError(f"vehicle {config.name}: a point has no physics; allowed is motion: multirotor")
+    return config
 
 
 class Batch:
