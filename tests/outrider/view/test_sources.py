@@ -55,7 +55,7 @@ def test_a_run_is_played_as_it_was(made: WrittenRun) -> None:
     for wall in (0.5, 1.0, 4.0):
         (moment,) = seen(player, wall)
         assert moment.time == pytest.approx(-1.0 + wall)
-        row = int(np.searchsorted(made.time, moment.time, side="right")) - 1
+        row = int(np.searchsorted(made.time, moment.time + 1e-6, side="right")) - 1
         np.testing.assert_allclose(moment.position, made.position[row], atol=1e-5)
         np.testing.assert_allclose(np.linalg.norm(moment.attitude, axis=1), 1.0, atol=1e-6)
 
