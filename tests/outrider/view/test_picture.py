@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from companion.values.horizon import roll_out
 from outrider.palette import VEHICLES, linear, rgb
 from outrider.scene.airframe import HEXAROTOR, airframe
+from outrider.scene.planes import MOST, between, facing
 from outrider.scene.scene import Scene, staged
 from outrider.scene.snapshot import KNOTS, Snapshot, State, euler_attitude, nearest, padded
 from outrider.view import shapes
 from outrider.view.panel import struck, table
-from outrider.view.planes import MOST, between, facing
 from tests.outrider.shipped import SCENARIOS, scenario
 
 ANGLES = st.floats(-3.1, 3.1)

@@ -22,6 +22,7 @@ from outrider.realtime.view_page import Window
 from outrider.runs import names
 from outrider.scene.changes import Change
 from outrider.scene.companion_snapshot import MODES, CompanionSnapshot
+from outrider.scene.recorded import Record
 from outrider.scene.scene import Scene
 from outrider.scene.snapshot import KNOTS, NO_PLAN, Snapshot, State
 from outrider.scene.view_commands import ViewCommands
@@ -30,7 +31,6 @@ from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
 from outrider.view.listener import Listener
 from outrider.view.player import Player, load
-from outrider.view.recorded import Record
 from tests.outrider.report.runs import WrittenRun, leave
 from tests.outrider.said import Run
 from tests.outrider.shipped import FIREFLY, LOGS

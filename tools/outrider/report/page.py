@@ -24,6 +24,7 @@ SCRIPTS = (
     "cursor.js",
     "camera.js",
     "glyphs.js",
+    "extent.js",
     "scene.js",
     "vehicles.js",
     "sight.js",

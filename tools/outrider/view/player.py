@@ -14,10 +14,10 @@ from outrider.runs import names
 from outrider.runs.arrays import Motion, Plans
 from outrider.runs.source import read
 from outrider.scene.airframe import airframe
+from outrider.scene.recorded import Record, record
 from outrider.scene.scene import Scene, staged
 from outrider.scene.snapshot import Snapshot, State
 from outrider.scene.view_commands import ViewCommands
-from outrider.view.recorded import Record, record
 
 PAST, PAST_EVERY = 20.0, 0.2
 """Length (s) of the trails that are drawn again after a jump, and the interval (s) of their samples."""

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from outrider.palette import ACCENT, GRID, LINE, RGB, SOFT, SOLID, TARGET, colours, linear, rgb
 from outrider.scene.camera_view import field_lines, rays
+from outrider.scene.planes import MOST, Plane, between, facing
 from outrider.scene.scene import Scene, Solid
 from outrider.scene.snapshot import Array, Single, Snapshot
 from outrider.view import camera, shapes
 from outrider.view.bodies import AWAY, IDENTITY, Bodies
-from outrider.view.planes import MOST, Plane, between, facing
 from outrider.view.trails import Trails
 
 WORLD = "/world"
