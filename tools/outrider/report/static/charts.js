@@ -161,12 +161,17 @@ function follow(made) {
   tellAt(made, cursor.time);
 }
 
+// A separation has the two decimals that it has in the scene.
+function shown(made, value) {
+  return made.key === "separation" && Number.isFinite(value) ? value.toFixed(2) : figure(value);
+}
+
 function tellAt(made, time) {
   const { index, next, share } = place(time, made.times);
   const parts = made.lines.map((line, j) => {
     const value = made.values.values[(share < 0.5 ? index : next) * made.row + j];
     const part = html("span");
-    part.append(swatch(lineIndex(made, j)), `${line.name} ${figure(value)}`);
+    part.append(swatch(lineIndex(made, j)), `${line.name} ${shown(made, value)}`);
     part.hidden = !visible(made, j);
     return part;
   });
