@@ -24,14 +24,17 @@ _DEFAULT_SPACING_M, _DEFAULT_HEIGHT_M = 3.0, 5.0
 
 
 def vehicle_config(vehicle: str | Path | VehicleConfig) -> VehicleConfig:
-    """Return the type of vehicle with this name, or from this file. Raises InputError."""
-    if isinstance(vehicle, VehicleConfig):
-        return vehicle
-    if not isinstance(vehicle, str | Path):
+    """Return the type of vehicle with this name, or from this file. Raises InputError, also for a point."""
+    if not isinstance(vehicle, str | Path | VehicleConfig):
         raise InputError(
             f"vehicle: is a {type(vehicle).__name__}; allowed: a name, a file, or a VehicleConfig"
         )
-    return load(find("vehicles", str(vehicle)), VehicleConfig)
+    config = (
+        vehicle if isinstance(vehicle, VehicleConfig) else load(find("vehicles", str(vehicle)), VehicleConfig)
+    )
+    if config.motion == "point":
+        raise InputError(f"vehicle {config.name}: a point has no physics; allowed is motion: multirotor")
+    return config
 
 
 class Batch:
