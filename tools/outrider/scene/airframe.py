@@ -32,8 +32,6 @@ HEXAROTOR = Airframe(0.63, tuple((0.341 * cos(a), 0.341 * sin(a)) for a in _TURN
 
 def airframe_of(vehicle: VehicleConfig) -> Airframe:
     """Return the shape of ``vehicle``; a propeller reaches from its hub to the span's circle."""
-    if not vehicle.rotors:
-        return HEXAROTOR._replace(span=float(vehicle.span))
     reach = max(rotor.arm for rotor in vehicle.rotors)
     return Airframe(
         float(vehicle.span),
