@@ -178,6 +178,12 @@ class GroundTruth:
         _, rows, place, _ = self._rows[-1]
         return rows[:, 0:3], rows[:, 3:6], None if np.isnan(place).any() else place
 
+    @property
+    def latest_separation(self) -> float:
+        """``Samples.separation`` (m) of the last sample."""
+        self._work_out()
+        return self._least[-1]
+
     def samples(self, since: int = 0, until: int | None = None) -> Samples:
         """Return all samples with ``since`` ≤ time < ``until``."""
         self._work_out()
