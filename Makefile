@@ -3,7 +3,7 @@ PYTHON ?= python3
 ARGS ?=
 JOBS ?= 2
 BIN = .venv/bin
-SCRIPTS = tools/bootstrap.py tools/client_environments.py tools/extract_log.py
+SCRIPTS = tools/bootstrap.py tools/client_environments.py tools/extract_log.py tools/readme_hook.py
 CLIENTS = tests/clients/requirements
 
 .PHONY: fly test slow trial soak lint bench schemas docs site requirements clean

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from companion.values.settings import Positive, Settings, WireStep
 
@@ -20,11 +20,22 @@ TurningSense = Literal["own", "right", "left"]
 Triple = tuple[float, float, float]
 
 
-Bounds = tuple[
-    Annotated[float, Field(gt=0.0, le=100.0)],
-    Annotated[float, Field(gt=0.0, le=100.0)],
-    Annotated[float, Field(gt=0.0, le=100.0)],
+Bound = Annotated[float, Field(gt=0.0, le=100.0)]
+
+
+def _of_each_axis(value: object) -> object:
+    """Return three times a number, a list as a tuple, and everything else as it is."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return value, value, value
+    # A strict model takes no list from a function, although it takes one from JSON.
+    return tuple(value) if isinstance(value, list) else value
+
+
+Bounds = Annotated[
+    tuple[Bound, Bound, Bound],
+    BeforeValidator(_of_each_axis, json_schema_input_type=Bound | tuple[Bound, Bound, Bound]),
 ]
+"""Bounds of the three axes, east, north and up; one number is that of each."""
 
 
 class HorizonConfig(Settings):
@@ -129,6 +140,13 @@ class FieldConfig(Potential):
     )
     smoothing_us: int = Field(
         50_000, ge=0, le=2_000_000, description="time constant of the field's low-pass, µs; 0 for none"
+    )
+    downwash: float = Field(
+        1.0,
+        ge=1.0,
+        le=20.0,
+        description="height over width of the ellipsoid in which the distance of two vehicles is measured:"
+        " differences in height are divided by it; 1: a ball. In certified mode the same for the fleet",
     )
     position_sigma: float = Field(
         0.0, ge=0.0, le=5.0, description="m, σ of a vehicle's estimated position on its worst axis"

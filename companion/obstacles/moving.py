@@ -54,7 +54,9 @@ class MovingObstacles:
         for j, row in found:
             if not self._ball[row]:
                 positions[j, :, 2] = np.minimum(prediction[:, 2], self._top[row])
-        return Obstacles(others.ids, positions, least, safe, radius)
+        heights = np.broadcast_to(others.heights, len(others.ids)).copy()
+        heights[here] = 1.0
+        return Obstacles(others.ids, positions, least, safe, radius, heights)
 
     def distance(self, points: Array, places: Array) -> Array:
         """Return the distances (…, K, M), m, from ``points`` (…, K, 3) to obstacles at ``places`` (…, M, 3).

@@ -113,6 +113,7 @@ class Neighbours:
         self._table = self._plans.table
         margin = config.field.margin(2)
         self._margin: Array = np.full(_SYSTEM_IDS, margin)
+        self._heights: Array = np.full(_SYSTEM_IDS, 1.0 / config.field.downwash)
         self._d_min: Array = np.full(_SYSTEM_IDS, config.field.d_min + margin)
         self._d_safe: Array = np.full(_SYSTEM_IDS, config.field.d_safe + margin)
         self._unheard = None if config.guard.unheard_us is None else Unheard(config)
@@ -281,7 +282,14 @@ class Neighbours:
         moves = config.neighbour_prediction == "velocity"
         most, step = config.neighbour.extrapolate_us if moves else -1, 1e-6 * config.horizon.dt_us
         align(states, age, here, silent, deviation, self._fading, step, most, positions, trusted)
-        found = Obstacles(ids, positions, self._d_min[:count], self._d_safe[:count], self._margin[:count])
+        found = Obstacles(
+            ids,
+            positions,
+            self._d_min[:count],
+            self._d_safe[:count],
+            self._margin[:count],
+            self._heights[:count],
+        )
         if further is not None:
             further[trusted] = 0.0
         if doubtful:

@@ -101,7 +101,9 @@ class RelevanceFilter:
 
     def use(self, methods: Sequence[MethodName]) -> None:
         """Adapt to the ``methods`` that the planner uses from now on."""
-        self._use_all = self._config.avoidance == "certified" or "swivel" in methods
+        # The bounds are Euclidean, and with downwash a vehicle high above is nearer than that.
+        downwash = self._config.field.downwash > 1.0
+        self._use_all = self._config.avoidance == "certified" or "swivel" in methods or downwash
         self._ignored_until.clear()
 
     def ignores(self, sender: int) -> bool:

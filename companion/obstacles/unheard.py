@@ -45,8 +45,8 @@ class Unheard:
 
     def radii(self, ages: Ages | Array) -> Array:
         """Return by how much (m) neighbours may be beside their last course, (M,); 0 for those just heard."""
-        grown: Array = 1e-6 * self._growth * np.clip(ages - self._after, 0, self._most)
-        return grown
+        silent = np.asarray(ages - self._after, dtype=np.float64)
+        return np.asarray(1e-6 * self._growth * np.clip(silent, 0.0, self._most))
 
     def pace(self, now: int, ages: Ages, here: Array, place: Array, towards: Array) -> float:
         """Return the speed (m/s) at which a vehicle at ``place`` (3,) may fly ``towards`` (3,), both m.

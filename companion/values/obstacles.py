@@ -11,6 +11,8 @@ from companion.values.horizon import Array
 
 _NO_EXTRA_RADIUS = np.zeros(1)
 _NO_EXTRA_RADIUS.flags.writeable = False
+_FULL_HEIGHT = np.ones(1)
+_FULL_HEIGHT.flags.writeable = False
 
 
 class Obstacles(NamedTuple):
@@ -19,7 +21,8 @@ class Obstacles(NamedTuple):
     ``positions`` (M, N + 1, 3) are those at n = 0…N. ``d_min`` and ``d_safe`` (M,) are distances between
     centres and include ``radius`` (M,) or (1,), by which an obstacle is larger than a vehicle: its own size,
     and a margin for the uncertainty of its position. ``ids`` identify the obstacles for logs, and for
-    methods that store on which side they pass an obstacle.
+    methods that store on which side they pass an obstacle. ``heights`` (M,) or (1,): number by which
+    differences in height count in the distance, less than 1 for vehicles with downwash.
     """
 
     ids: tuple[int, ...]
@@ -27,6 +30,7 @@ class Obstacles(NamedTuple):
     d_min: Array
     d_safe: Array
     radius: Array = _NO_EXTRA_RADIUS
+    heights: Array = _FULL_HEIGHT
 
     def joined(self, others: Obstacles) -> Obstacles:
         """Return these obstacles and ``others`` together."""
@@ -38,6 +42,7 @@ class Obstacles(NamedTuple):
             np.concatenate([self.d_min, others.d_min]),
             np.concatenate([self.d_safe, others.d_safe]),
             np.concatenate([np.broadcast_to(part.radius, len(part.ids)) for part in (self, others)]),
+            np.concatenate([np.broadcast_to(part.heights, len(part.ids)) for part in (self, others)]),
         )
 
     def shared(self, systems: Collection[int], spacing: float) -> Obstacles:

@@ -65,6 +65,11 @@ class Link(Protocol):
         ...
 
 
+def failure_of(link: Link) -> str:
+    """Return why ``link`` has no peer, in the system's words; empty if it has one, or if unknown."""
+    return str(getattr(link, "failure", ""))
+
+
 class MemoryLink:
     """One of two connected ends within a process, see ``memory_pair``; a full end drops its oldest data."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import selectors
 import socket
 from contextlib import suppress
@@ -58,6 +60,8 @@ class TcpCaller(StreamLink):
         super().__init__(clock, BACKLOG)
         self._attempt: socket.socket | None = None
         self._attempt_began = 0
+        self.failure = ""
+        """Why the last attempt failed, in the system's words; empty with a peer and before a failure."""
         self.receive()
 
     def _reopen(self, now: int) -> None:
@@ -70,7 +74,8 @@ class TcpCaller(StreamLink):
             connection.connect(self._address)
         except BlockingIOError:
             pass  # the usual case: the socket becomes writable when the attempt succeeds or fails
-        except OSError:
+        except OSError as error:
+            self.failure = because(error)
             connection.close()
             return
         self._attempt, self._attempt_began = connection, now
@@ -81,12 +86,12 @@ class TcpCaller(StreamLink):
         if connection is None or ready is not connection:
             return
         # A TCP connection to a free port of this machine may by chance be connected to itself.
-        if (
-            connection.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
-            or connection.getsockname() == self._address
-        ):
+        error = connection.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        if error or connection.getsockname() == self._address:
+            self.failure = os.strerror(error or errno.ECONNREFUSED)
             self._abort_attempt()
             return
+        self.failure = ""
         self._selector.unregister(connection)
         self._attempt = None
         _configure(connection)

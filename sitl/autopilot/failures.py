@@ -52,7 +52,10 @@ class Failures:
 
     def _motor(self, instance: float, left: float) -> CommandRefusal | None:
         """Limit motor ``instance`` (1: the first, 0: all) to the fraction ``left`` (0…1) of its speed."""
-        count = len(self._plant.vehicle.config.rotors)
+        config = self._plant.vehicle.config
+        if config.motion == "point":
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Failure refused: a point has no motors")
+        count = len(config.rotors)
         if not instance.is_integer() or not 0 <= instance <= count:
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Failure refused: there are {count} motors")
         chosen = range(count) if instance == 0 else [int(instance) - 1]

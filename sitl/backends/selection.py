@@ -8,6 +8,7 @@ import numpy as np
 
 from mavlink_bridge.frames import FleetFrame
 from sitl.backends.physics import Physics, PhysicsName
+from sitl.backends.point_vehicle import PointVehicle
 from sitl.environment.turbulence import W20, Severity
 from sitl.environment.weather import WeatherConfig
 from sitl.vehicle.airframe import FloatArray
@@ -42,11 +43,16 @@ def physics(
 
     ``seed`` (≥ 0) and ``system_id`` seed JSBSim's turbulence. ``site`` is the frame of ``start``; only JSBSim
     uses it. Raises ValueError for a hover position on the ground or for weather that needs JSBSim; with
-    JSBSim also ModuleNotFoundError if it is not installed, and BackendError if it refuses the vehicle.
+    JSBSim also ModuleNotFoundError if it is not installed, and BackendError if it refuses the vehicle. A
+    point is moved by no physics, and with JSBSim raises ValueError.
     """
+    if config.motion == "point" and name != "own":
+        raise ValueError(f"{config.name} is a point, which needs physics: own")
     if name == "own":
         if weather.needs_jsbsim:
             raise ValueError(f"the weather has {weather.needs_jsbsim}, which needs physics: jsbsim")
+        if config.motion == "point":
+            return PointVehicle(config, start.position, start.yaw, start.ground, hovering=start.hovering)
         return Vehicle(config, start.position, start.yaw, start.ground, hovering=start.hovering)
     from sitl.backends.jsbsim_engine import Air
     from sitl.backends.jsbsim_place import Place

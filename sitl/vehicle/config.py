@@ -42,7 +42,7 @@ class Rotor(BaseModel):
 
 
 class VehicleConfig(BaseModel):
-    """Multirotor with rotors of one kind that all push the same way, and its geometric controller.
+    """Multirotor with rotors of one kind that push the same way, and its geometric controller; or a point.
 
     Raises ``pydantic.ValidationError`` for rotors that cannot hover, or cannot produce the three moments and
     a thrust independently of each other.
@@ -54,6 +54,20 @@ class VehicleConfig(BaseModel):
     mass: Positive = Field(description="kg")
     inertia: tuple[Positive, Positive, Positive] = Field(description="diagonal of J about body axes (kg m²)")
     span: Positive = Field(description="tip-to-tip diameter (m)")
+    motion: Literal["multirotor", "point"] = Field(
+        "multirotor",
+        description="multirotor: rigid body with rotors and controller; point: it is where its reference"
+        " says, without physics, for comparisons with planners that assume this",
+    )
+    point_window_us: int = Field(
+        0,
+        ge=0,
+        le=2_000_000,
+        multiple_of=4,
+        description="µs over which a point averages its reference; 0: it is exactly there (double"
+        " integrator); certified.dt_us: limits.j_max bounds its jerk, and it is half of that"
+        " late (triple integrator)",
+    )
 
     rotors: tuple[Rotor, ...] = Field(min_length=4, description="in the order of the motor outputs")
     k_f: Positive = Field(description="thrust over squared rotor speed (N s²/rad²)")
@@ -106,6 +120,15 @@ class VehicleConfig(BaseModel):
 
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
+        if self.point_window_us and self.motion != "point":
+            raise ValueError(
+                f"point_window_us {self.point_window_us} needs motion: point; it is {self.motion!r}"
+            )
+        if self.point_window_us % self.physics_period:
+            raise ValueError(
+                f"point_window_us {self.point_window_us} must be a multiple of physics_period"
+                f" {self.physics_period}"
+            )
         if self.omega_idle >= self.omega_max:
             raise ValueError(f"omega_idle {self.omega_idle} must be below omega_max {self.omega_max}")
         lift = len(self.rotors) * self.k_f * self.omega_max**2

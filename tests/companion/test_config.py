@@ -66,3 +66,12 @@ def test_what_is_written_is_what_is_read():
     config = CompanionConfig.model_validate({"planar": True, "field": {"gain": 20.0}})
     assert CompanionConfig.model_validate(config.model_dump()) == config
     assert CompanionConfig.model_validate_json(config.model_dump_json()) == config
+
+
+@pytest.mark.parametrize("bounds", ["u_max", "v_max", "j_max"])
+def test_one_number_bounds_each_axis(bounds: str) -> None:
+    one, three = (CompanionConfig.model_validate({"limits": {bounds: value}}) for value in (4.0, [4.0] * 3))
+    assert one == three
+    for wrong in (True, "4 m/s", 0.0, [4.0, 4.0], {"x": 4.0}):
+        with pytest.raises(ValidationError):
+            CompanionConfig.model_validate({"limits": {bounds: wrong}})

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from companion.avoidance.field.methods import Influence, Method, Scene
-    from companion.config import CompanionConfig as PlannerConfig
     from companion.config.obstacles import Post, Sphere
     from outrider import sim
     from outrider.errors import InputError, OutriderError
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from outrider.flights.flying import fly, scenario
     from outrider.planner.own_parts import OwnSurface as Surface
     from outrider.planner.planner import Planner
+    from outrider.planner.planner_config import PlannerConfig
     from outrider.planner.values import Motion, Neighbour, Obstacle, Plan, Setpoint, Step, Target
     from outrider.scenarios.scenario import Scenario
 
@@ -62,7 +62,7 @@ _PLACES = {
     "OutriderError": "outrider.errors:OutriderError",
     "Plan": "outrider.planner.values:Plan",
     "Planner": "outrider.planner.planner:Planner",
-    "PlannerConfig": "companion.config:CompanionConfig",
+    "PlannerConfig": "outrider.planner.planner_config:PlannerConfig",
     "Post": "companion.config.obstacles:Post",
     "Scenario": "outrider.scenarios.scenario:Scenario",
     "Scene": "companion.avoidance.field.methods:Scene",

@@ -10,7 +10,7 @@ from typing import Annotated, Final, cast
 
 import typer
 
-from outrider.commands.campaigns import gallery, paper, sweep
+from outrider.commands.campaigns import compare, gallery, paper, sweep
 from outrider.commands.finding import listing, new
 from outrider.commands.flying import doctor, fly, preflight, sitl, swarm
 from outrider.commands.machine import bench, key
@@ -74,6 +74,7 @@ for _command in (
     fly,
     sweep,
     paper,
+    compare,
     gallery,
     replay,
     export,

@@ -33,14 +33,21 @@ def checked(name: str, value: ArrayLike, shape: tuple[int | str, ...], unit: str
     return found
 
 
-def number(name: str, value: float, unit: str, *, least: float | None = None) -> float:
-    """Return ``value`` if it is a finite number of at least ``least``; otherwise raise InputError."""
+def number(
+    name: str, value: float, unit: str, *, least: float | None = None, above: float | None = None
+) -> float:
+    """Return ``value`` if it is a finite number of at least ``least``, or above ``above``.
+
+    Otherwise raise InputError.
+    """
     bound = "" if least is None else f" of at least {least:g}"
+    bound += "" if above is None else f" above {above:g}"
     allowed = f"allowed: a finite number{bound}, {unit}"
     if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
         raise InputError(f"{name}: is no number; {allowed}")
     found = float(value)
-    if not isfinite(found) or (least is not None and found < least):
+    below = (least is not None and found < least) or (above is not None and found <= above)
+    if not isfinite(found) or below:
         raise InputError(f"{name}: is {found:g}; {allowed}")
     return found
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from outrider.compare.comparison import Comparison
 from outrider.scenarios.cameras import CameraFile
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.scenarios.scenario import Scenario
@@ -27,6 +28,7 @@ SCHEMAS: list[tuple[str, type[BaseModel]]] = [
     ("camera", CameraFile),
     ("sweep", Sweep),
     ("scene", Scene),
+    ("comparison", Comparison),
 ]
 """The name of each schema file, and the model from which it is made."""
 

@@ -21,11 +21,15 @@ class Distances:
     """Distances between plans, and the tests of two plans that depend on them.
 
     ``between``: least distance (m) between two plans in space; each column of the two adds ``further`` (m).
-    ``planar``: heights never count. ``steps``: number of knots of a plan.
+    ``planar``: heights never count. ``steps``: number of knots of a plan. ``downwash``: height over width of
+    the ellipsoid in which distances in space are measured.
     """
 
-    def __init__(self, between: float, further: float, steps: int, *, planar: bool = False) -> None:
+    def __init__(
+        self, between: float, further: float, steps: int, *, planar: bool = False, downwash: float = 1.0
+    ) -> None:
         self._between, self._further, self._planar = between, further, planar
+        self._downwash = downwash
         self._rows = np.full((1, steps + 1), between)
 
     def least(self, columns: int) -> float:
@@ -39,12 +43,14 @@ class Distances:
         ``own`` and ``other``.
         """
         seen = levelled(other, own) if columns else other
-        return keeps(newest, own, seen, self._rows + columns * self._further, upright=self._planar)
+        rows = self._rows + columns * self._further
+        return keeps(newest, own, seen, rows, upright=self._planar, downwash=self._downwash)
 
     def apart(self, one: Array, other: Array, columns: int) -> bool:
         """Return whether two plans are the least distance apart at all times, horizontally near a column."""
         least = self.least(columns) - (_ROUNDING_M if columns else 0.0)
-        return apart(one, other, least, upright=self._planar or columns > 0)
+        upright = self._planar or columns > 0
+        return apart(one, other, least, upright=upright, downwash=self._downwash)
 
 
 def levelled(plan: Array, own: Array) -> Array:

@@ -69,10 +69,8 @@ class ConstraintSources:
         taken_over = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
         members = agreements.members.union(left.keys() - taken_over) - agreements.away
         seen = self._noncooperative.seen(begins, members, world)
-        noncooperative = [
-            *self._noncooperative.balls(seen, own),
-            *self._noncooperative.target(now, begins, view),
-        ]
+        strangers = self._noncooperative.balls(seen, own)
+        noncooperative = [*strangers, *self._noncooperative.target(now, begins, view)]
         sensed = world.sensed.around(epoch, own.reshape(-1, 3), self._sight)
         lasts = list(left.values())
         beside_plans = [place for system, (_, place, _) in aside.items() if system not in taken_over]
@@ -94,7 +92,13 @@ class ConstraintSources:
                 distance[index] += pair.columns * self._further
         for index, (_, radii) in enumerate(unshared, count):
             distance[index] = radii
-        others = Others(_stacked(bases, n), _stacked(controls, n), distance, np.arange(len(bases)) < count)
+        heights = np.ones(len(bases))
+        if self._config.field.downwash > 1.0:
+            last, first = count + len(lasts), len(bases) - len(noncooperative) - len(sensed.ids)
+            of_vehicles = [*range(last), *range(first, first + len(strangers))]
+            heights[of_vehicles] = 1.0 / self._config.field.downwash
+        shares = np.arange(len(bases)) < count
+        others = Others(_stacked(bases, n), _stacked(controls, n), distance, shares, heights)
         return others, self._noncooperative.field(seen, own, sensed)
 
     def _fixed_constraints(self, own: Array) -> list[tuple[Array, float]]:
@@ -181,7 +185,7 @@ class ConstraintSources:
         for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():
             if system not in agreements.left:
                 level = self._config.planar or system in agreements.columns
-                above = 0.0 if level else max(end[2] - high, low - end[2], 0.0)
+                above = 0.0 if level else max(end[2] - high, low - end[2], 0.0) / self._config.field.downwash
                 vehicles.append((tuple(end[:2]), self.between, above))
         return [_discs(fixed + landed + vehicles), _discs(fixed + landed)]
 

@@ -2,8 +2,8 @@
 
 Two vehicles compute the same planes, with the same distance between their plans, only if these settings are
 equal: the fleet frame's origin, the knots and the epochs of plans, whether heights count, all parts of the
-least distance between plans (``margins.between``), the scale of fleet time, and who takes part. Each
-statement of agreements carries the fingerprint.
+least distance between plans (``margins.between``) and its measure (``field.downwash``), the scale of fleet
+time, and who takes part. Each statement of agreements carries the fingerprint.
 
 Settings of one vehicle alone are not part of it: the limits of acceleration and the box of its plans, the
 costs, the bounds of vehicles that share no plan (the vehicle itself keeps clear of those), and the times at
@@ -62,6 +62,9 @@ def fingerprint(config: CompanionConfig, frame: FleetFrame) -> int:
         certified.clock_us,
         _time_scale(config),
     ]
+    if field.downwash != 1.0:
+        # A ball is left out: its fingerprint is that of fleets from before this setting.
+        numbers.append(round(field.downwash * _MICRO))
     members = sum(1 << system for system in set(certified.fleet))
     data = b"".join(number.to_bytes(8, "little", signed=True) for number in numbers)
     return crc32(data + members.to_bytes(32, "little"))

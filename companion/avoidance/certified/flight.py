@@ -51,7 +51,8 @@ class CertifiedFlight:
         self._sources = ConstraintSources(config, steps)
         self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
         between = self._sources.between
-        distances = Distances(between, further(certified), steps, planar=config.planar)
+        downwash = config.field.downwash
+        distances = Distances(between, further(certified), steps, planar=config.planar, downwash=downwash)
         self.agreements = Agreements(
             own.system,
             certified,

@@ -13,6 +13,10 @@ neighbour's new plan must satisfy the same from the other side. So any two new p
 along c at every control point, hence everywhere on the segment (a Bézier curve lies in the hull of its
 control points). The own plan of the pair itself satisfies it, with room max(c·r_i − d, 0)/2. For an obstacle
 that shares no plan the own side keeps the whole distance, and the own plan of the pair is the committed one.
+
+With ``downwash`` w > 1 the distance of two vehicles is ‖S Δ‖ with S = diag(1, 1, 1/w): the construction is
+that of the plans S p, and c·S q_i is (S c)·q_i, so S c is the normal of the rows. S is linear: hulls remain
+hulls, and ‖S e‖ ≤ ‖e‖ for the errors that d covers.
 """
 
 from __future__ import annotations
@@ -34,17 +38,19 @@ class Others(NamedTuple):
 
     ``own`` and ``controls`` (M, n, 3, 3), m: control points of the own plan and of the other plan of each
     pair, on the committed plan's knots. ``distance`` (M, n), m: least distance on each segment. ``shares``
-    (M,): whether the other side keeps half of it itself.
+    (M,): whether the other side keeps half of it itself. ``heights`` (M,): 1/w, by which differences in
+    height are multiplied; None: 1.
     """
 
     own: Array
     controls: Array
     distance: Array
     shares: NDArray[np.bool_]
+    heights: Array | None = None
 
 
 class Planes(NamedTuple):
-    """Normals c (M, n, 3), and the least c·q for each control point (M, n, 3).
+    """Normals c (M, n, 3), or S c where heights count less, and the least c·q of control points (M, n, 3).
 
     ``least`` is what must hold; ``wanted`` is slightly more where the committed plan allows it, so that a
     rounded plan still keeps ``least``.
@@ -65,23 +71,28 @@ def planes(committed: Array, others: Others, spare: float, *, upright: bool = Fa
     committed, own, controls, distance = map(
         np.ascontiguousarray, (committed, others.own, others.controls, others.distance)
     )
-    _planes(committed, own, controls, distance, others.shares, spare, upright, *found)
+    heights = np.ones(len(own)) if others.heights is None else np.ascontiguousarray(others.heights)
+    _planes(committed, own, controls, distance, others.shares, heights, spare, upright, *found)
     return found
 
 
-def keeps(newest: Array, own: Array, other: Array, distance: Array, *, upright: bool = False) -> bool:
+def keeps(
+    newest: Array, own: Array, other: Array, distance: Array, *, upright: bool = False, downwash: float = 1.0
+) -> bool:
     """Return whether ``newest`` keeps the own side of the planes of the pair of plans ``own`` and ``other``.
 
-    All are control points (n, 3, 3), m, on the same knots; ``distance`` (1, n), m.
+    All are control points (n, 3, 3), m, on the same knots; ``distance`` (1, n), m; ``downwash``: w.
     """
-    pair = Others(own[None], other[None], distance, np.ones(1, dtype=np.bool_))
+    heights = np.full(1, 1.0 / downwash)
+    pair = Others(own[None], other[None], distance, np.ones(1, dtype=np.bool_), heights)
     found = planes(newest, pair, 0.0, upright=upright)
     return kept(found, newest)
 
 
-def apart(one: Array, two: Array, distance: float, *, upright: bool = False) -> bool:
+def apart(one: Array, two: Array, distance: float, *, upright: bool = False, downwash: float = 1.0) -> bool:
     """Return whether two plans, control points (n, 3, 3), m, are ``distance`` (m) apart at all times."""
     relative = one - two
+    relative[..., 2] *= 1.0 / downwash
     if upright:
         relative[..., 2] = 0.0
     return bool((hull_distance(relative) >= distance).all())
@@ -164,13 +175,14 @@ def _nearest_all(triangles: Array, normals: Array) -> None:
         _nearest(triangles[k], candidate, normals[k])
 
 
-@kernel(VOID, array(3), array(4), array(4), array(2), array(1, BOOL), FLOAT, BOOL, *[output(3)] * 3)
+@kernel(VOID, array(3), array(4), array(4), array(2), array(1, BOOL), array(1), FLOAT, BOOL, *[output(3)] * 3)
 def _planes(
     committed: Array,
     own: Array,
     controls: Array,
     distance: Array,
     shares: NDArray[np.bool_],
+    heights: Array,
     spare: float,
     upright: bool,
     normals: Array,
@@ -178,20 +190,24 @@ def _planes(
     wanted: Array,
 ) -> None:
     """Write the planes of the module's docstring to the last three arrays."""
-    relative, candidate = np.empty((3, 3)), np.empty(3)
+    relative, candidate, gaps = np.empty((3, 3)), np.empty(3), np.empty(3)
     for m in range(len(controls)):
         half = 0.5 if shares[m] else 1.0
         for n in range(len(committed)):
             for i in range(3):
                 for k in range(3):
                     relative[i, k] = own[m, n, i, k] - controls[m, n, i, k]
+                relative[i, 2] *= heights[m]
                 if upright:
                     relative[i, 2] = 0.0
             c = normals[m, n]
             _nearest(relative, candidate, c)
             for i in range(3):
+                gaps[i] = _dot(c, relative[i]) - distance[m, n]
+            c[2] *= heights[m]
+            for i in range(3):
                 here = _dot(c, own[m, n, i])
-                gap = _dot(c, relative[i]) - distance[m, n]
+                gap = gaps[i]
                 least[m, n, i] = here - half * max(gap, 0.0)
                 spared = here - half * max(gap - spare, 0.0)
                 wanted[m, n, i] = max(least[m, n, i], min(spared, _dot(c, committed[n, i])))

@@ -7,6 +7,9 @@ the obstacle (the printed α points towards it). Below d_min the formula turns n
 value there, far above the vehicle's largest acceleration. The sum is limited to a_total, not its parts:
 otherwise an obstacle that pushes from behind would cancel one that is about to be hit.
 
+Downwash. Where heights count by a factor 1/w the distance is ‖(Δx, Δy, Δz/w)‖, and the force is still the
+negative gradient: F(d) along (Δx, Δy, Δz/w²)/d.
+
 Closing speed. From d_safe = 3 m the bare field cannot stop two vehicles that meet at 5 m/s each: that takes
 about 10 m/s² net. So the distance that enters F is what would be left after braking, d − ċ²/(2 a_rel) with ċ
 the closing speed and a_rel the relative deceleration to count on. At rest this is the paper's field; at a
@@ -84,6 +87,7 @@ def repulsion(
             np.ascontiguousarray(obstacles.positions),
             obstacles.d_min,
             obstacles.d_safe,
+            np.ascontiguousarray(np.broadcast_to(obstacles.heights, len(obstacles.ids))),
             gain,
             clamp,
             0.0 if braking is None else braking,
@@ -101,12 +105,13 @@ def stopping_distance(closing: float, braking: float, reaction: float) -> float:
     return closing * abs(closing) / (2.0 * braking) + closing * reaction
 
 
-@kernel(VOID, array(2), array(3), array(1), array(1), FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, output(2))
+@kernel(VOID, array(2), array(3), *[array(1)] * 3, *[FLOAT] * 6, output(2))
 def _repulsion(
     own: Array,
     positions: Array,
     d_min: Array,
     d_safe: Array,
+    heights: Array,
     gain: float,
     clamp: float,
     braking: float,
@@ -128,6 +133,8 @@ def _repulsion(
             square = 0.0
             for i in range(3):
                 away[n, i] = own[n, i] - positions[j, n, i]
+                if i == 2:
+                    away[n, i] *= heights[j]
                 square += away[n, i] * away[n, i]
             distance[n] = sqrt(square)
         for n in range(steps):
@@ -151,7 +158,8 @@ def _repulsion(
                 x, y = cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y
             force[n, 0] += size * x
             force[n, 1] += size * y
-            force[n, 2] += size * z
+            # The gradient of the distance: heights that count less push less, too.
+            force[n, 2] += size * z * heights[j]
 
 
 def smoothed(force: Array, most: float, last: Array, share: float, *, planar: bool) -> Array:

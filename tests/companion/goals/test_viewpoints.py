@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -161,3 +163,26 @@ def test_nobody_crosses_to_a_place_that_is_taken():
     crossing = Crossing()
     bearings = np.array([0.0, 0.1, np.pi])
     assert not any(crossing.sense(50_000 * tick, 1, bearings, APART, 0.0) for tick in range(200))
+
+
+@pytest.mark.parametrize(
+    ("scales", "low", "high"),
+    [
+        ([1.0, 1.0, 1.0, np.inf, np.inf], 0.92, 0.93),
+        ([1.0, 1.0, 1.0, 3.0, 3.0], 0.94, 0.96),
+    ],
+    ids=["two see nothing", "two are three times worse"],
+)
+def test_with_two_of_five_cameras_worse_the_best_bearings_gain_less_than_a_tenth(scales, low, high):
+    """RMSE in the plane at the least |s|, relative to equal angles, over all places of the two."""
+    along, across = 0.6 * np.array(scales), np.radians(1.0) * np.hypot(6.0, 5.0) * np.array(scales)
+    a, weights = 0.5 * (along**-2.0 + across**-2.0), 0.5 * (across**-2.0 - along**-2.0)
+    least = max(0.0, 2.0 * weights.max() - weights.sum())
+    even = 2.0 * np.pi * np.arange(5) / 5
+    squares = np.array([abs(anisotropy(even, weights[list(order)])) ** 2 for order in permutations(range(5))])
+    traces = 2.0 * a.sum() / (a.sum() ** 2 - squares)
+    best = 2.0 * a.sum() / (a.sum() ** 2 - least**2)
+    assert low < np.sqrt(best / traces.mean()) < high
+    # The optimum is reached, so this is a bound that holds and not one that is too low.
+    starts = drawn(5, 3)[0]
+    assert share(rested(starts, weights), weights) == pytest.approx(least / weights.sum(), abs=0.03)

@@ -19,12 +19,17 @@ from jsonschema import Draft202012Validator
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Channel, Message, Schema
 
+from outrider.errors import InputError
 from outrider.export.attitude import along_down, quaternions
 from outrider.export.px4_topics import quaternion
+from outrider.palette import VEHICLES, rgb
+from outrider.resources import find
+from outrider.yaml_files.yaml_file import load
+from sitl.vehicle.config import VehicleConfig
 from tests.outrider.export.runs import SYSTEMS, everything, received
 
 One = tuple[Schema, Channel, Message]
-SCENES = {"vehicles", "paths", "target", "obstacles", "moving", "trails"}
+SCENES = {"vehicles", "paths", "target", "obstacles", "moving", "trails", "plans"}
 
 
 class Content(NamedTuple):
@@ -199,6 +204,63 @@ def test_everything_to_be_seen_hangs_on_a_frame_that_is_there(found: Content) ->
     shells = found.values["/scene/vehicles"][0][1]["entities"][0]["spheres"]
     assert shells[0]["size"] == {"x": 0.5, "y": 0.5, "z": 0.5}
     assert shells[0]["color"]["a"] < 0.5
+
+
+def test_a_vehicle_is_a_multirotor_with_the_rotors_of_its_file(found: Content) -> None:
+    of = load(find("vehicles", "firefly"), VehicleConfig)
+    (entity, *_) = found.values["/scene/vehicles"][0][1]["entities"]
+    rotors = [
+        one for one in entity["cylinders"] if one["size"]["x"] > 0.25 * of.span and one["size"]["z"] < 0.01
+    ]
+    places = sorted((one["pose"]["position"]["x"], one["pose"]["position"]["y"]) for one in rotors)
+    # Foxglove's frame has y to the left, the file to the right.
+    expected = sorted((rotor.position[0], -rotor.position[1]) for rotor in of.rotors)
+    np.testing.assert_allclose(places, expected, atol=1e-3)
+    assert len(entity["cubes"]) == len(of.rotors)
+    reach = max(np.hypot(x, y) for x, y in places) + 0.5 * rotors[0]["size"]["x"]
+    assert 2.0 * reach == pytest.approx(of.span, abs=2e-3)
+    color = [rotors[0]["color"][part] for part in "rgb"]
+    assert color == pytest.approx(np.array(rgb(VEHICLES[0])) / 255.0, abs=1e-3)
+
+
+def test_planned_paths_begin_where_the_vehicles_are(found: Content, flight: dict[str, np.ndarray]) -> None:
+    drawn, last = 0, -1
+    for time, value in found.values["/scene/plans"]:
+        assert time - last >= 200_000_000 or last < 0
+        last = time
+        row = int(np.argmin(np.abs(flight["time_s"] - (time / 1e3 - flight["start_us"]) / 1e6)))
+        for k, entity in enumerate(value["entities"]):
+            assert entity["id"] == f"plan-{SYSTEMS[k]}"
+            for line in entity["lines"]:
+                begin = [line["points"][0][axis] for axis in "xyz"]
+                # A plan is up to 0.1 s old, and sent with 0.1 m at most of difference to the true position.
+                assert np.linalg.norm(begin - flight["position"][row, k]) < 1.0
+                drawn += 1
+    assert drawn > 20
+
+
+def test_the_layout_shows_channels_that_are_there(run: Path, tmp_path: Path) -> None:
+    told = content(exported(run, tmp_path / "flight.mcap"))
+    layout = json.loads((tmp_path / "flight.foxglove.json").read_text())
+    panels = layout["configById"]
+
+    def leaves(node: Any) -> list[str]:
+        return [node] if isinstance(node, str) else leaves(node["first"]) + leaves(node["second"])
+
+    assert sorted(leaves(layout["layout"])) == sorted(panels)
+    for name, panel in panels.items():
+        for path in panel.get("paths", []):
+            topic, *fields = path["value"].split(".")
+            value: Any = told.values[topic][-1][1]
+            for field in fields:
+                value = value[field]
+            assert isinstance(value, float), name
+    shown = {topic for topic, of in panels["3D!scene"]["topics"].items() if of["visible"]}
+    assert {f"/scene/{name}" for name in SCENES - {"paths"}} <= shown
+    # An export writes over nothing, neither over a layout.
+    (tmp_path / "flight.mcap").unlink()
+    with pytest.raises(InputError, match=r"flight\.foxglove\.json: exists"):
+        exported(run, tmp_path / "flight.mcap")
 
 
 # What was said

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections import Counter
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,7 @@ def csv_table(path: Path, types: pa.Schema) -> pa.Table:
     return pyarrow.csv.read_csv(
         path,
         parse_options=pyarrow.csv.ParseOptions(newlines_in_values=True),
-        convert_options=pyarrow.csv.ConvertOptions(column_types=types, null_values=[]),
+        convert_options=pyarrow.csv.ConvertOptions(column_types=types, null_values=[""]),
     )
 
 
@@ -73,7 +74,8 @@ def test_vehicles_are_those_that_were_flown(run: Path, found: dict[str, pa.Table
         rows = system == one
         np.testing.assert_array_equal(table["time_s"].to_numpy()[rows], flight["time_s"])
         unix = flight["start_us"] + np.rint(flight["time_s"] * 1e6).astype(np.int64)
-        np.testing.assert_array_equal(table["time_us"].to_numpy()[rows], unix)
+        assert table.schema.field("utc").type == pa.timestamp("us", tz="UTC")
+        np.testing.assert_array_equal(table["utc"].to_numpy()[rows], unix.astype("datetime64[us]"))
         for array, prefix, unit in (
             ("position", "", "m"),
             ("velocity", "velocity_", "m_s"),
@@ -102,14 +104,19 @@ def test_plans_are_those_that_were_made(run: Path, found: dict[str, pa.Table]) -
             assert (np.diff(times["time_s"][times["system"] == system]) > 0.0).all()
 
 
+def stamp(time: int) -> datetime:
+    """A time in Unix µs as the tables have it."""
+    return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=time)
+
+
 def rows_of(found: dict[str, pa.Table]) -> list[tuple[Any, ...]]:
     """Of all tables of messages: log, time, link, who, name, and a text of the rest."""
     rows = []
     for name, table in found.items():
         if name.startswith("mavlink/"):
             for row in table.to_pylist():
-                head = tuple(row.pop(one) for one in HEAD)
-                rows.append((*head, name.rpartition("/")[2], repr(row)))
+                time, *head = (row.pop(one) for one in HEAD)
+                rows.append((time, *head, name.rpartition("/")[2], repr(row)))
     return rows
 
 
@@ -126,12 +133,13 @@ def expected_row(message: Heard) -> dict[str, Any]:
             row |= {f"{name}[{k}]{suffix}": item for k, item in enumerate(value)}
         else:
             row[f"{name}{suffix}"] = value
-    return row
+    # NaN is a missing value.
+    return {name: None if value != value else value for name, value in row.items()}
 
 
 def test_every_message_of_the_logs_is_there(run: Path, found: dict[str, pa.Table]) -> None:
     expected = [
-        (one.time, system, one.link, one.system, one.component, one.name, repr(expected_row(one)))
+        (stamp(one.time), system, one.link, one.system, one.component, one.name, repr(expected_row(one)))
         for system in SYSTEMS
         for one in received(run / f"vehicle-{system}.tlog")
     ]
@@ -148,7 +156,7 @@ def test_any_message_of_the_dialect_becomes_a_row(tmp_path: Path) -> None:
     waiting = {name: iter(table.to_pylist()) for name, table in found.items()}
     for message in received(log):
         row = next(waiting[f"mavlink/1/{message.name}"])
-        assert row.pop("time_us") == message.time
+        assert row.pop("utc") == stamp(message.time)
         assert [row.pop(name) for name in HEAD[1:]] == [0, message.link, 1, 1]
         assert all_same(row.values(), expected_row(message).values()), message.name
         assert list(row) == list(expected_row(message))

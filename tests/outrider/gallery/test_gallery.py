@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from outrider.errors import InputError
+from outrider.gallery import figures
 from outrider.gallery.command import gallery
 from outrider.gallery.figures import outcome
 from outrider.gallery.flying import fly
@@ -113,3 +118,74 @@ def test_whose_violation_it_was(separation: float, whose: str) -> None:
     summary = {"converged": True, "convergence_time_s": 7.0, "min_separation_m": separation, "d_min_m": 0.5}
     run = run_of(Entry("key", 1, "done", None, summary | {"d_min_violations": 1}, 0.0))
     assert outcome(run) == f"7.0 s, least {separation:.2f} m, 1 violation{whose}"
+
+
+def scene(shift: float, *, apart: float, standoff: bool) -> dict[str, Any]:
+    """What a flight leaves for its panel: two vehicles that fly north, ``shift`` to the east."""
+    times = [0.1 * k for k in range(20)]
+    found: dict[str, Any] = {
+        "time_s": times,
+        "position": [[[shift, 10.0 * t], [shift + 3.0, 10.0 * t]] for t in times],
+        "separation": [apart] * 20,
+        "target": [[shift, 5.0]] * 20,
+        "obstacles": [[shift + 8.0, 0.0, 1.0]],
+        "moving": [],
+        "moving_radius": [],
+        "vehicles": 2,
+        "d_min": 0.5,
+    }
+    return found | ({"standoff": [[0.3, 0.9]] * 20} if standoff else {})
+
+
+@pytest.fixture
+def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Figure]:
+    """Draws panels, and gives the figure."""
+    kept: list[Figure] = []
+    save = Figure.savefig
+
+    def keep(figure: Figure, *arguments: Any, **more: Any) -> None:
+        kept.append(figure)
+        save(figure, *arguments, **more)
+
+    monkeypatch.setattr(Figure, "savefig", keep)
+
+    def call(*scenes: dict[str, Any] | None) -> Figure:
+        run = run_of(Entry("key", 1, "done", None, {"converged": True, "convergence_time_s": 1.0}, 0.0))
+        figures.draw(
+            "a scenario", [(way, run, of) for way, of in zip(WAYS, scenes, strict=False)], tmp_path / "a.png"
+        )
+        return kept[-1]
+
+    return call
+
+
+def test_panels_of_a_row_have_the_same_axes_and_no_chart_is_empty(drawn: Callable[..., Figure]) -> None:
+    figure = drawn(
+        scene(0.0, apart=3.0, standoff=True),
+        scene(40.0, apart=30.0, standoff=True),
+        scene(5.0, apart=-1.0, standoff=True),
+    )
+    rows = np.array(figure.axes).reshape(3, 3)
+    for row in rows:
+        assert len({(axes.get_xlim(), axes.get_ylim()) for axes in row}) == 1
+    for axes in rows[1:].ravel():
+        low, high = axes.get_ylim()
+        there = [y for line in axes.lines for y in np.ravel(line.get_ydata()) if len(line.get_ydata()) > 2]
+        assert axes.texts or any(low <= y <= high for y in there)
+    assert [axes.get_ylabel() for axes in rows[:, 0]] == [
+        "north, m",
+        "least separation, m",
+        "stand-off error, m",
+    ]
+    # The separation of 30 m lies in its chart, as everything in the picture from above does.
+    assert rows[1, 1].get_ylim()[1] > 30.0
+    assert rows[0, 0].get_xlim()[0] < 0.0 < 49.0 < rows[0, 0].get_xlim()[1]
+
+
+def test_without_an_escort_there_is_no_stand_off_and_without_a_flight_no_axes(
+    drawn: Callable[..., Figure],
+) -> None:
+    figure = drawn(scene(0.0, apart=3.0, standoff=False), None)
+    rows = np.array(figure.axes).reshape(2, 2)
+    assert [axes.axison for axes in rows[:, 1]] == [False, False]
+    assert [text.get_text() for text in rows[0, 1].texts] == ["no flight"]

@@ -34,6 +34,8 @@ BEFORE = 3.0
 ARRIVAL = 20_000
 """µs on the way."""
 
+NEARER = 0.07
+"""m by which two vehicles were nearer between two samples than at them."""
 Lost = Callable[[int, int, int], bool]
 """Of the nth message from one system to another: whether it is lost."""
 
@@ -65,7 +67,7 @@ def leave(
     position, velocity = circle(time, vehicles)
     _write_configuration(directory, flown)
     _write_summary(directory, vehicles, summary)
-    separation = np.where(time < -1.0, np.inf, _least(position))
+    separation = np.where(time < -1.0, np.inf, _least(position) - NEARER)
     np.savez_compressed(
         directory / "flight.npz",
         system=np.arange(11, 11 + vehicles),

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from outrider.palette import VEHICLES
 from outrider.report.command import report
 from tests.outrider.report.runs import WrittenRun, leave
 
@@ -85,9 +86,9 @@ def within(page: str, identifier: str) -> str:
 
 
 def nearest(made: WrittenRun, time: float) -> float:
-    index = int(np.argmin(np.abs(made.time - time)))
-    place = made.position[index]
-    return min(float(np.linalg.norm(place[j] - place[k])) for j in range(len(place)) for k in range(j))
+    """The run's own figure at a time."""
+    with np.load(made.directory / "flight.npz") as file:
+        return float(file["separation"][int(np.argmin(np.abs(file["time_s"] - time)))])
 
 
 @pytest.mark.parametrize("time", [0.0, 3.2, 9.96])
@@ -95,6 +96,8 @@ def test_the_page_shows_the_flight_at_a_time(time: float, made: WrittenRun, brow
     page = browse(made.directory / "report.html", f"#{time}")
     shown = within(page, "now")
     assert shown.startswith(f"{time:.2f} s · nearest {nearest(made, time):.2f} m, ")
+    # The scene and the chart show the number in the file.
+    assert f"vehicle to vehicle {nearest(made, time):.2f}</span>" in page
     assert within(page, "clock") == f"{time:.2f} s"
     assert page.count('class="line"') == 5 * 3 + 2
     assert "mine</title>" not in page
@@ -115,7 +118,7 @@ def test_the_canvas_is_painted(made: WrittenRun, browse: Browse) -> None:
     found = re.search(r'data-seen="([^"]*)"', page)
     assert found is not None
     # The colours of the three vehicles, among others.
-    assert {"3f90da", "ffa90e", "bd1f01"} <= set(found[1].split())
+    assert {code[1:] for code in VEHICLES[:3]} <= set(found[1].split())
 
 
 def test_clicks_and_keys(made: WrittenRun, browse: Browse) -> None:
@@ -137,7 +140,7 @@ def test_clicks_and_keys(made: WrittenRun, browse: Browse) -> None:
       ["t", "0", "f", "+", "-", "ArrowLeft", "ArrowUp"].forEach(key);
       document.querySelector("#vehicles button").click();
       told.push(document.querySelectorAll("#charts .line").length);
-      const chart = document.querySelector("#charts svg");
+      const chart = document.querySelector("#charts svg[role=img]");
       const box = chart.getBoundingClientRect();
       const at = { clientX: box.right - 12, clientY: box.top + 30, buttons: 1, pointerId: 1 };
       chart.dispatchEvent(new PointerEvent("pointermove", at));

@@ -83,14 +83,6 @@ def test_charts_hold_what_they_say(tmp_path: Path) -> None:
     assert spent["p50"] == pytest.approx(0.3, abs=1e-3)
 
 
-@given(arrays(np.float64, 40, elements=st.floats(0.1, 9.0)), st.integers(1, 7))
-def test_thinning_keeps_the_least(values: np.ndarray, stride: int) -> None:
-    shown = np.arange(39, -1, -stride)[::-1]
-    thin = thinning.least(values, shown)
-    assert thin.min() == values.min()
-    assert (thin <= values[shown]).all()
-
-
 def test_the_largest_in_between_is_kept() -> None:
     shown = np.array([0.0, 1.0, 2.0, 3.0])
     found = thinning.largest(np.array([0.2, 0.7, 1.0, 2.5, 9.0]), np.array([1.0, 5.0, 2.0, 7.0, 99.0]), shown)

@@ -295,3 +295,11 @@ def test_the_emulated_autopilot_is_watched_at_every_physics_step() -> None:
     assert np.isnan(samples.reference).all()
     # On the ground nobody is near anybody.
     assert seen.target.count == 0
+
+
+def test_with_downwash_heights_count_for_less() -> None:
+    vehicles = [OnRails(lambda _: (0.0, 0.0, 5.0)), OnRails(lambda _: (0.0, 0.3, 5.8))]
+    seen = GroundTruth(2, Limits(LEAST, downwash=2.0))
+    watch(vehicles, seen, 0.2)
+    assert seen.vehicles.minimum == pytest.approx(0.5, abs=1e-9)
+    assert truth(vehicles).vehicles.minimum > 0.8

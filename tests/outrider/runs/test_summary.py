@@ -88,6 +88,7 @@ class Flown:
     covered: int = 1
     failure: str | None = None
     span: float = 0.63
+    motion: str = "multirotor"
     tallies: Any = TALLIES
     seed: int = 7
     systems: tuple[int, ...] = (11, 12)

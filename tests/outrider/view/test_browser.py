@@ -225,7 +225,7 @@ def middle(where: NDArray[np.bool_]) -> NDArray[np.float64]:
     return np.argwhere(where).mean(axis=0)
 
 
-VIVID = [rgb(VEHICLES[k]) for k in (0, 1, 2, 4)]
+VIVID = [rgb(VEHICLES[k]) for k in (0, 1, 2, 3)]
 """Blue, amber, red, violet: those whose hue nothing else has."""
 
 

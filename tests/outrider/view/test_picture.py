@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 
 from companion.values.horizon import roll_out
 from outrider.palette import VEHICLES, linear, rgb
+from outrider.scene.airframe import HEXAROTOR, airframe
+from outrider.scene.planes import MOST, between, facing
 from outrider.scene.scene import Scene, staged
 from outrider.scene.snapshot import KNOTS, Snapshot, State, euler_attitude, nearest, padded
 from outrider.view import shapes
 from outrider.view.panel import struck, table
-from outrider.view.planes import MOST, between, facing
 from tests.outrider.shipped import SCENARIOS, scenario
 
 ANGLES = st.floats(-3.1, 3.1)
@@ -47,7 +48,7 @@ def test_attitudes_point_where_the_angles_say(roll: float, pitch: float, yaw: fl
 @pytest.mark.parametrize("name", sorted(SCENARIOS))
 def test_every_shipped_scenario_has_a_scene(name: str) -> None:
     of = scenario(name)
-    scene = staged(of, 1, 0.6, frozenset({"pace", "methods"}))
+    scene = staged(of, 1, airframe(of.vehicle), frozenset({"pace", "methods"}))
     assert scene.systems == tuple(of.systems)
     assert len(scene.solids) == len(of.obstacles)
     assert len(scene.movers) == len(of.moving)
@@ -97,8 +98,10 @@ def test_a_plan_of_any_length_fills_its_rows() -> None:
 @pytest.mark.parametrize(
     "mesh",
     [
-        shapes.rotors(),
-        shapes.frame(),
+        shapes.rotors(HEXAROTOR),
+        shapes.frame(HEXAROTOR),
+        shapes.blades(HEXAROTOR),
+        shapes.nose(),
         shapes.ball(1.0),
         shapes.prism(8, 1.0, 2.0),
         shapes.cone(1.0, 0.2, 0.0),
@@ -122,7 +125,7 @@ def test_colours_as_intensities() -> None:
     assert linear((255, 255, 255)).tolist() == [255, 255, 255]
     # Middle grey of sRGB is a fifth of the light.
     assert linear((118, 118, 118)).tolist() == [46, 46, 46]
-    assert rgb(VEHICLES[0]) == (63, 144, 218)
+    assert rgb(VEHICLES[0]) == (46, 143, 249)
 
 
 @given(VECTORS, VECTORS, st.floats(-5.0, 5.0))

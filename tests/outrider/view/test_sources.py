@@ -22,6 +22,7 @@ from outrider.realtime.view_page import Window
 from outrider.runs import names
 from outrider.scene.changes import Change
 from outrider.scene.companion_snapshot import MODES, CompanionSnapshot
+from outrider.scene.recorded import Record
 from outrider.scene.scene import Scene
 from outrider.scene.snapshot import KNOTS, NO_PLAN, Snapshot, State
 from outrider.scene.view_commands import ViewCommands
@@ -30,7 +31,6 @@ from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
 from outrider.view.listener import Listener
 from outrider.view.player import Player, load
-from outrider.view.recorded import Record
 from tests.outrider.report.runs import WrittenRun, leave
 from tests.outrider.said import Run
 from tests.outrider.shipped import FIREFLY, LOGS
@@ -55,7 +55,7 @@ def test_a_run_is_played_as_it_was(made: WrittenRun) -> None:
     for wall in (0.5, 1.0, 4.0):
         (moment,) = seen(player, wall)
         assert moment.time == pytest.approx(-1.0 + wall)
-        row = int(np.searchsorted(made.time, moment.time, side="right")) - 1
+        row = int(np.searchsorted(made.time, moment.time + 1e-6, side="right")) - 1
         np.testing.assert_allclose(moment.position, made.position[row], atol=1e-5)
         np.testing.assert_allclose(np.linalg.norm(moment.attitude, axis=1), 1.0, atol=1e-6)
 

@@ -100,6 +100,7 @@ def _weaker(
         epoch, (mine, others) = max(one.agreement), one.agreement
         apart = points.later(one.owner, mine, epoch) - points.later(one.peer, others, epoch)
         columns = points.columns(one)
+        apart[..., 2] /= terms.downwash
         if terms.upright or columns:
             apart[..., 2] = 0.0
         distance = float(hull_distance(apart).min())
@@ -153,6 +154,9 @@ def _beyond(points: _Points, system: int, epoch: int, listed: Sequence[Listing],
     own = np.stack([points.later(system, one.agreement[0], epoch) for one in listed])
     relative = own - np.stack([points.later(one.peer, one.agreement[1], epoch) for one in listed])
     columns = np.array([points.columns(one) for one in listed])
+    # In the plans whose heights are divided by the downwash, distances are Euclidean.
+    for points_ in (plan, own, relative):
+        points_[..., 2] /= terms.downwash
     relative[(columns > 0) | terms.upright, ..., 2] = 0.0
     normals = nearest(relative.reshape(-1, 3, 3)).reshape(*relative.shape[:2], 1, 3)
     required = (terms.required + columns * terms.further)[:, None, None]

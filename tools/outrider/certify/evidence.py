@@ -17,7 +17,7 @@ class Terms(NamedTuple):
     (µs); ``steps``: number of knots of a plan; ``fleet_identity``: fingerprints in plans and statements;
     ``required``: least distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²);
     ``upright``: whether only horizontal distances count; ``further``: what each column adds to the least
-    distance (m).
+    distance (m); ``downwash``: number by which differences in height are divided.
     """
 
     fleet: tuple[int, ...]
@@ -30,6 +30,7 @@ class Terms(NamedTuple):
     a_max: Integers
     upright: bool
     further: float = 0.0
+    downwash: float = 1.0
 
 
 class LoggedPlan(NamedTuple):

@@ -89,4 +89,5 @@ def _terms(config: FlyConfig) -> Terms:
         (x, y, z),
         companion.planar,
         further(certified),
+        companion.field.downwash,
     )

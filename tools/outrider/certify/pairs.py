@@ -159,6 +159,7 @@ def _distances(
     }
     points = {k: controls(plan) for k, plan in goes_on.items()}
     relative: Array = np.stack([points[i] - points[j] for i, j in together])
+    relative[..., 2] /= terms.downwash
     count = np.array(columns)
     relative[(count > 0) | terms.upright, ..., 2] = 0.0
     distances = hull_distance(relative.reshape(-1, 3, 3)).reshape(len(together), -1)

@@ -116,6 +116,7 @@ def terms_of(scenario: Scenario) -> Terms:
         (x, y, z),
         config.planar,
         further(certified),
+        config.field.downwash,
     )
 
 

@@ -55,6 +55,33 @@ def paper(
     raise typer.Exit(comparing(seeds, jobs, out, as_json, response=response))
 
 
+def compare(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="A file, or the name of a shipped comparison.", autocompletion=shipped("comparisons")
+        ),
+    ],
+    seeds: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="Flights of each row; by default the file's.")
+    ] = None,
+    row: Annotated[
+        list[str] | None, typer.Option(help="Fly only rows whose label begins so; several times for several.")
+    ] = None,
+    missions: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Mission files of LSC's planners, in place of drawn missions."),
+    ] = None,
+    jobs: Jobs = None,
+    out: Begun = None,
+    as_json: AsJson = False,
+) -> None:
+    """Fly the scene of a published planner with its limits, and show ours beside the published figures."""
+    from outrider.compare.command import compare as comparing
+
+    raise typer.Exit(comparing(name, seeds, jobs, out, as_json, tuple(row or ()), missions))
+
+
 def gallery(
     names: Annotated[
         list[str] | None,

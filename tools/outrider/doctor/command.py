@@ -11,7 +11,7 @@ from typing import Final
 from mavlink_bridge.clocks.clock import Clock, WallClock
 from mavlink_bridge.errors import EndpointError, LinkError, LogError
 from mavlink_bridge.links.endpoints import Endpoint, Replay, Serial, parse_endpoint
-from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.link import Link, failure_of
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.tlog.log import TlogReader
 from mavlink_bridge.wire.framing import Frame, frame_at
@@ -96,4 +96,5 @@ def consult(link: Link, clock: Clock, consultation: Consultation) -> Verdict:
             watch(consultation.doing(now), consultation.share(now))
             clock.wait_until(now + _POLL_INTERVAL_US)
             now = clock.now()
+        consultation.examination.hearing.failure = failure_of(link)
     return consultation.examination.verdict()

@@ -27,7 +27,7 @@ class Hearing:
     ``begin`` and ``end`` span all that was received or waited for (µs). ``octets``: bytes of frames. ``bad``,
     ``skipped_bytes``: frames with a wrong checksum, and bytes that belong to no frame. ``unreceived``: frames
     of senders beyond the first ``MOST``. ``refused``: frames that failed the signature check; ``refusal``:
-    why the last of these failed.
+    why the last of these failed. ``failure``: why the link has no peer.
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class Hearing:
         self.begin: int | None = None
         self.end = 0
         self.frames = self.octets = self.bad = self.skipped_bytes = self.unreceived = self.refused = 0
-        self.refusal = ""
+        self.refusal = self.failure = ""
 
     def receive(self, now: int, frame: Frame) -> None:
         """Add ``frame``, which arrived at ``now`` (µs); a time that goes back counts as the previous one."""

@@ -34,6 +34,14 @@ def nobody(hearing: Hearing, system: int | None, log: bool) -> Finding:
                 "Set the baud rate of the endpoint to that of the autopilot's port (SERIALn_BAUD, "
                 "SER_TEL1_BAUD), and the port's protocol to MAVLink 2 (SERIALn_PROTOCOL = 2, MAV_n_CONFIG).",
             )
+        if hearing.failure:
+            return Finding(
+                f"no connection: {hearing.failure}",
+                severity,
+                "No program accepts connections at this address.",
+                "Start the autopilot, simulator or router first, and compare host and port: "
+                "tcp:127.0.0.1:5760 for ArduPilot's SITL. A sender of UDP needs udpin:HOST:PORT here.",
+            )
         return Finding(
             f"nothing arrives in {hearing.seconds:.0f} s",
             severity,

@@ -54,7 +54,11 @@ def export(source: Path, form: str, out: Path | None, as_json: bool) -> None:
             written = _write(run, part, form, watch)
         except LogError as error:
             raise InputError(str(error)) from None
-        files = [path for path in part.rglob("*") if path.is_file()] if part.is_dir() else [part]
+        files = (
+            [path for path in part.rglob("*") if path.is_file()]
+            if part.is_dir()
+            else [*part.parent.iterdir()]
+        )
         size = sum(path.stat().st_size for path in files)
     loss = total_loss(list(run.logs))
     result = Result(form, str(place), len(files), size, *written, loss.damaged, loss.unknown, run.unread)

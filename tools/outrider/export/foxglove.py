@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from outrider.palette import RGB
+
 Json = dict[str, Any]
 Point = Sequence[float]
 
@@ -21,6 +23,12 @@ class Color(NamedTuple):
     g: float
     b: float
     a: float = 1.0
+
+    @classmethod
+    def of(cls, colour: RGB) -> Color:
+        """Return the opaque colour with the given sRGB values, each 0…255."""
+        red, green, blue = (round(part / 255.0, 3) for part in colour)
+        return cls(red, green, blue)
 
     def faint(self, opacity: float) -> Color:
         """Return the same colour with another opacity."""
@@ -44,9 +52,9 @@ def turn(quaternion: Sequence[float]) -> Json:
     return {"x": x, "y": y, "z": z, "w": w}
 
 
-def pose(at: Point) -> Json:
-    """Return the pose at a position, without rotation."""
-    return {"position": point(at), "orientation": turn((1.0, 0.0, 0.0, 0.0))}
+def pose(at: Point, quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0)) -> Json:
+    """Return the pose at a position, with the rotation (w, x, y, z)."""
+    return {"position": point(at), "orientation": turn(quaternion)}
 
 
 def transform(time_us: int, parent: str, child: str, at: Point, quaternion: Sequence[float]) -> Json:
@@ -106,10 +114,21 @@ def sphere(at: Point, diameter: float, color: Color) -> Json:
     return {"pose": pose(at), "size": point((diameter,) * 3), "color": color._asdict()}
 
 
-def cylinder(at: Point, diameter: float, height: float, color: Color) -> Json:
-    """Return a cylinder along z with its centre at ``at``."""
+def cube(at: Point, size: Point, color: Color, quaternion: Sequence[float]) -> Json:
+    """Return a box with its centre at ``at`` and its edges along the axes of the rotation (w, x, y, z)."""
+    return {"pose": pose(at, quaternion), "size": point(size), "color": color._asdict()}
+
+
+def cylinder(
+    at: Point,
+    diameter: float,
+    height: float,
+    color: Color,
+    quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+) -> Json:
+    """Return a cylinder along the z of the rotation (w, x, y, z), with its centre at ``at``."""
     return {
-        "pose": pose(at),
+        "pose": pose(at, quaternion),
         "size": point((diameter, diameter, height)),
         "bottom_scale": 1.0,
         "top_scale": 1.0,

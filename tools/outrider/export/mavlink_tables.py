@@ -18,14 +18,14 @@ from outrider.export.table_files import Column, Part
 from outrider.logs.dialect import Field, Kind, text
 from outrider.logs.message_stream import LogMessage
 
-HEAD: Final = ("time_us", "log", "link", "system", "component")
+HEAD: Final = ("utc", "log", "link", "system", "component")
 """Columns before the fields.
 
-They are Unix µs, the vehicle that recorded the log (0 for a log outside a run), the link (0…3), and the
-sender's system and component id.
+They are the time (UTC), the vehicle that recorded the log (0 for a log outside a run), the link (0…3), and
+the sender's system and component id.
 """
 _HEAD = Struct("<qBBBB")
-_HEAD_TYPES = [("time_us", "<i8"), ("log", "u1"), ("link", "u1"), ("system", "u1"), ("component", "u1")]
+_HEAD_TYPES = [("utc", "<M8[us]"), ("log", "u1"), ("link", "u1"), ("system", "u1"), ("component", "u1")]
 _PART_ROWS: Final = 32_768
 _MAX_BUFFER_BYTES: Final = 32 << 20
 """Total size of the buffered rows of all tables at which they are written."""

@@ -1,6 +1,7 @@
 """Tables of a flight: true motion, separation and plans.
 
-The names of columns have the units. Coordinates are fleet-local ENU. Missing values are NaN.
+The names of columns have the units. Coordinates are fleet-local ENU. A missing value is NaN here and null in
+the file.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ def parts(run: Run) -> Iterator[Part]:
     """Yield the parts of all tables of a flight.
 
     The tables are ``vehicles``, ``separation`` (with the target), ``moving``, ``plans`` and ``plan_times``.
-    In every table ``time_s`` counts from the goal event, and ``time_us`` is Unix time.
+    In every table ``time_s`` counts from the goal event, and ``utc`` is a time stamp.
     """
     motion = run.motion
     if motion is None:
@@ -34,7 +35,7 @@ def parts(run: Run) -> Iterator[Part]:
         "separation",
         {
             **_when(motion.time_s, motion.time),
-            "separation_m": motion.separation,
+            "separation_m": np.where(np.isfinite(motion.separation), motion.separation, np.float32(np.nan)),
             **_vector("target", "m", motion.target),
         },
     )
@@ -88,7 +89,7 @@ def _plans(name: str, plans: Plans, values: dict[str, Column]) -> Part:
 
 
 def _when(seconds: NDArray[np.float64], unix: Whole) -> dict[str, Column]:
-    return {"time_s": seconds, "time_us": unix}
+    return {"time_s": seconds, "utc": unix.astype("datetime64[us]")}
 
 
 def _vector(name: str, unit: str, values: NDArray[np.floating]) -> dict[str, Column]:

@@ -10,6 +10,7 @@ from tempfile import mkdtemp
 from typing import Final
 
 from outrider.errors import InputError
+from outrider.export.foxglove_layout import layout_path
 
 FILE, FOLDER = "mcap", ("csv", "parquet", "ulog")
 FORMATS: Final = (FILE, *FOLDER)
@@ -28,6 +29,10 @@ def destination(source: Path, form: str, out: Path | None) -> Path:
     if out.exists() and not (form in FOLDER and out.is_dir() and not any(out.iterdir())):
         allowed = "a new or empty directory" if form in FOLDER else "a new file"
         raise InputError(f"{out}: exists, and nothing is overwritten; allowed: --out with {allowed}")
+    if form == FILE and layout_path(out).exists():
+        raise InputError(
+            f"{layout_path(out)}: exists, and nothing is overwritten; allowed: --out with a new file"
+        )
     return out
 
 
@@ -41,6 +46,8 @@ def _default(source: Path, form: str) -> Path:
 @contextmanager
 def fresh(path: Path, form: str) -> Iterator[Path]:
     """Provide a temporary path to write to, and move the result to ``path`` if no error occurs.
+
+    A file that was written beside the temporary path moves with it.
 
     The temporary folder is beside ``path`` and is deleted in any case. Raises InputError if it cannot be
     created.
@@ -58,5 +65,7 @@ def fresh(path: Path, form: str) -> Iterator[Path]:
         if path.is_dir():
             path.rmdir()
         part.rename(path)
+        for beside in folder.iterdir():
+            beside.rename(path.with_name(beside.name))
     finally:
         shutil.rmtree(folder)

@@ -6,7 +6,6 @@ viewer that jumps to any time therefore shows all bodies, and only frames and tr
 
 from __future__ import annotations
 
-import colorsys
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
@@ -14,25 +13,22 @@ import numpy as np
 
 from companion.config.companion import Obstacle
 from companion.config.obstacles import Post
-from outrider.errors import InputError
-from outrider.export import foxglove, foxglove_schemas
+from outrider.export import foxglove, foxglove_schemas, multirotor
 from outrider.export.attitude import quaternions, up_vectors
 from outrider.export.foxglove import Color, Json
 from outrider.export.mcap_file import Entry, entry
-from outrider.resources import find
+from outrider.palette import OBSTACLE, TARGET, hex_of, rgb
 from outrider.runs.arrays import Array, Motion
 from outrider.scenarios.moving import MovingPostPart
 from outrider.scenarios.scenario import Scenario
-from outrider.yaml_files.yaml_file import load
-from sitl.vehicle.config import VehicleConfig
+from outrider.scene.airframe import Airframe, airframe
 
 FLEET: Final = "fleet"
-BYSTANDER, TARGET, SOLID, SHELL = Color(0.6, 0.6, 0.6), Color(1.0, 0.8, 0.1), Color(0.45, 0.4, 0.38), 0.12
+SHELL = 0.12
+"""Opacity of the shells that are d_min wide."""
 TRAIL_US, TRAIL_EVERY_US, TRAIL_POINT = 10_000_000, 200_000, 5
 """Length of a trail (µs), its drawing period (µs), and the stride of its samples."""
 _IDENTITY = (1.0, 0.0, 0.0, 0.0)
-_SPAN = 0.6
-"""Span (m) of a vehicle whose file is not available."""
 
 
 class Stage(NamedTuple):
@@ -52,13 +48,13 @@ def bodies(stage: Stage) -> Iterator[Entry]:
     if not len(motion.time):
         return
     now = int(motion.time[0])
-    span = _span(scenario)
+    frame = airframe(scenario.vehicle)
 
     def reported(topic: str, *entities: Json) -> Entry:
         return entry(now, f"/scene/{topic}", foxglove_schemas.SCENE_UPDATE, foxglove.update(*entities))
 
     paint = colors(scenario)
-    vehicles = [_vehicle(now, system, span, scenario.d_min, paint[system]) for system in scenario.systems]
+    vehicles = [_vehicle(now, system, frame, scenario.d_min, paint[system]) for system in scenario.systems]
     yield reported("vehicles", *vehicles)
     yield reported("paths", *_paths(stage, paint))
     if np.isfinite(motion.target).any():
@@ -121,24 +117,15 @@ def trails(stage: Stage) -> Iterator[Entry]:
 
 
 def colors(scenario: Scenario) -> dict[int, Color]:
-    """Return the colour of each vehicle by system id: hues round the colour circle; bystanders are grey."""
-    result = {}
-    for k, system in enumerate(scenario.systems):
-        red, green, blue = colorsys.hsv_to_rgb(k / max(scenario.vehicles, 1), 0.8, 0.95)
-        own = Color(round(red, 3), round(green, 3), round(blue, 3))
-        result[system] = own if k < scenario.vehicles else BYSTANDER
-    return result
+    """Return the colour of each vehicle by system id, as in all pictures."""
+    return {system: Color.of(rgb(hex_of(k, scenario.vehicles))) for k, system in enumerate(scenario.systems)}
 
 
-def _span(scenario: Scenario) -> float:
-    try:
-        return float(load(find("vehicles", scenario.vehicle), VehicleConfig).span)
-    except InputError:
-        return _SPAN
+TARGET_COLOR, SOLID_COLOR = Color.of(rgb(TARGET)), Color.of(rgb(OBSTACLE))
 
 
-def _vehicle(now: int, system: int, span: float, d_min: float, color: Color) -> Json:
-    """Return a disc with an arrow along its nose, inside a shell of diameter d_min.
+def _vehicle(now: int, system: int, frame: Airframe, d_min: float, color: Color) -> Json:
+    """Return a multirotor inside a shell of diameter d_min.
 
     The centres of two vehicles whose shells touch are d_min apart.
     """
@@ -147,19 +134,20 @@ def _vehicle(now: int, system: int, span: float, d_min: float, color: Color) -> 
         f"vehicle-{system}",
         f"vehicle-{system}",
         {
-            "cylinders": [foxglove.cylinder((0.0, 0.0, 0.0), span, 0.12 * span, color)],
-            "arrows": [foxglove.arrow(span, 0.1 * span, color)],
+            **multirotor.shapes(frame, color),
             "spheres": [foxglove.sphere((0.0, 0.0, 0.0), d_min, color.faint(SHELL))],
-            "texts": [foxglove.label((0.0, 0.0, span), str(system), 0.5 * span, color)],
+            "texts": [foxglove.label((0.0, 0.0, frame.span), str(system), 0.5 * frame.span, color)],
         },
         locked=True,
     )
 
 
 def _target(now: int, scenario: Scenario) -> Json:
-    spheres = [foxglove.sphere((0.0, 0.0, 0.0), 0.4, TARGET)]
+    spheres = [foxglove.sphere((0.0, 0.0, 0.0), 0.4, TARGET_COLOR)]
     if scenario.d_min_target is not None:
-        spheres.append(foxglove.sphere((0.0, 0.0, 0.0), 2.0 * scenario.d_min_target, TARGET.faint(SHELL)))
+        spheres.append(
+            foxglove.sphere((0.0, 0.0, 0.0), 2.0 * scenario.d_min_target, TARGET_COLOR.faint(SHELL))
+        )
     return foxglove.entity(now, "target", "target", {"spheres": spheres}, locked=True)
 
 
@@ -181,12 +169,12 @@ def _moving(now: int, scenario: Scenario) -> Iterator[Json]:
 
 
 def _post(middle: foxglove.Point, radius: float, height: float, d_min: float) -> dict[str, list[Json]]:
-    sizes = ((radius, SOLID), (radius + d_min, SOLID.faint(SHELL)))
+    sizes = ((radius, SOLID_COLOR), (radius + d_min, SOLID_COLOR.faint(SHELL)))
     return {"cylinders": [foxglove.cylinder(middle, 2.0 * size, height, color) for size, color in sizes]}
 
 
 def _ball(middle: foxglove.Point, radius: float, d_min: float) -> dict[str, list[Json]]:
-    sizes = ((radius, SOLID), (radius + d_min, SOLID.faint(SHELL)))
+    sizes = ((radius, SOLID_COLOR), (radius + d_min, SOLID_COLOR.faint(SHELL)))
     return {"spheres": [foxglove.sphere(middle, 2.0 * size, color) for size, color in sizes]}
 
 
@@ -196,7 +184,7 @@ def _paths(stage: Stage, paint: Mapping[int, Color]) -> Iterator[Json]:
         (f"path-{system}", motion.position[::TRAIL_POINT, k], paint[system])
         for k, system in enumerate(stage.scenario.systems)
     ]
-    ways.append(("path-target", motion.target[::TRAIL_POINT], TARGET))
+    ways.append(("path-target", motion.target[::TRAIL_POINT], TARGET_COLOR))
     for name, way, color in ways:
         there = way[np.isfinite(way).all(axis=1)]
         if len(there):

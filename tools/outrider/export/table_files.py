@@ -54,7 +54,7 @@ class TableFiles:
 
     def write(self, part: Part) -> None:
         """Append a part to its table; in Parquet the part becomes a row group."""
-        batch = pa.table({name: pa.array(column) for name, column in part.columns.items()})
+        batch = pa.table({name: _array(column) for name, column in part.columns.items()})
         writer = self._open.get(part.table)
         if writer is None:
             path = self._folder / f"{part.table}.{self._form}"
@@ -66,3 +66,10 @@ class TableFiles:
             self._open[part.table] = writer
         writer.write_table(batch)
         self.rows += batch.num_rows
+
+
+def _array(column: Column) -> pa.Array:
+    """Return a column for a table: datetime64 as a time stamp in UTC, NaN as null."""
+    if isinstance(column, np.ndarray) and column.dtype.kind == "M":
+        return pa.array(column, type=pa.timestamp("us", tz="UTC"))
+    return pa.array(column, from_pandas=True)

@@ -8,6 +8,7 @@ import weakref
 from pathlib import Path
 from typing import Any
 
+from outrider.arguments import whole
 from outrider.errors import InputError
 from outrider.flights.flight import Flight
 from outrider.runs.directories import new_directory
@@ -41,8 +42,12 @@ def fly(
     the returned object. The same seed gives the same bytes. Raises InputError before the flight for wrong
     arguments, and OutriderError if it is interrupted.
     """
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise InputError(f"seed: is {seed!r}; allowed: a whole number of at least 0")
+    seed = whole("seed", seed, least=0)
+    processes = whole("processes", processes, least=1)
+    if not isinstance(scenario, str | Path | Scenario):
+        raise InputError(f"scenario: is a {type(scenario).__name__}; allowed: a name, a file, or a Scenario")
+    if out is not None and not isinstance(out, str | Path):
+        raise InputError(f"out: is a {type(out).__name__}; allowed: the path of a new directory")
     if isinstance(scenario, Scenario):
         if changes:
             raise InputError("changes: go with the name of a scenario; allowed: a Scenario without changes")

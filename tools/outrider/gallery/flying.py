@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
+from outrider.runs.summary import standoff_errors
 from outrider.simulation.preparation import measured
 from outrider.sweep.flying import prepared
 from outrider.sweep.tasks import Task
@@ -27,6 +29,7 @@ def _scene(outcome: Outcome) -> dict[str, Any]:
 
     Times (T,) since the goal event (s); horizontal positions (T, K, 2) and the target's path (≤ T,
     2), without the times at which it is absent (m); the least separation (T,), m, or −1 where there is none;
+    ``standoff``, of escorts only: median and largest of the vehicles' distances (T, 2), m, from the surface;
     obstacles as (east, north, radius); paths of moving obstacles (M, T, 2) and their radii; the number of
     vehicles without bystanders; d_min (m).
     """
@@ -40,6 +43,7 @@ def _scene(outcome: Outcome) -> dict[str, Any]:
         "time_s": np.round((samples.time[::_SAMPLES_PER_POINT] - start) * 1e-6, 2).tolist(),
         "position": np.round(samples.position[::_SAMPLES_PER_POINT, :, :2], 2).tolist(),
         "separation": np.round(np.where(np.isfinite(nearest), nearest, -1.0), 2).tolist(),
+        "standoff": _standoff(outcome, samples),
         "target": np.round(target[np.isfinite(target).all(axis=1)][:, :2], 2).tolist(),
         "obstacles": [[*one.at[:2], one.radius] for one in outcome.scenario.obstacles],
         "moving": np.round(samples.moving[::_SAMPLES_PER_POINT, :, :2].swapaxes(0, 1), 2).tolist(),
@@ -47,3 +51,15 @@ def _scene(outcome: Outcome) -> dict[str, Any]:
         "vehicles": outcome.scenario.vehicles,
         "d_min": outcome.scenario.d_min,
     }
+
+
+def _standoff(outcome: Outcome, samples: Samples) -> list[list[float]] | None:
+    if outcome.scenario.task != "escort":
+        return None
+    some = slice(None, None, _SAMPLES_PER_POINT)
+    errors = standoff_errors(outcome, samples.position[some], samples.target[some])
+    # A target that is absent has no surface around it.
+    there = np.where(np.isfinite(errors).any(axis=1, keepdims=True), errors, -1.0)
+    found = np.stack([np.nanmedian(there, axis=1), np.nanmax(there, axis=1)], axis=1)
+    rounded: list[list[float]] = np.round(found, 2).tolist()
+    return rounded

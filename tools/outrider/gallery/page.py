@@ -14,10 +14,11 @@ _HEAD = (
 Each shipped scenario, flown once from the air with seed {seed} in full physics over MAVLink: by the four
 methods of the field, and certified. Coloured lines are the vehicles' paths from above, from the ring to the
 dot; grey is what is in the way; the star is the target, the dotted line its way. Below each: the least
-distance of any two vehicles, and d_min in red. One flight is a picture, no measurement: for figures over many
-seeds see docs/results.md. A target shares no plan and gives way to no vehicle: separation from it is not
-proven. Certified vehicles fly their plans to the end and wait there while two clocks differ by more than
-twice `certified.clock_us`, as in `rough`.
+distance of any two vehicles, and d_min in red; for escorts also the distance from the surface around the
+target: a line for its median, a band up to its largest. All panels of a row have the same axes. One flight is
+a picture, no measurement: for figures over many seeds see docs/results.md. A target shares no plan and gives
+way to no vehicle: separation from it is not proven. Certified vehicles fly their plans to the end and wait
+there while two clocks differ by more than twice `certified.clock_us`, as in `rough`.
 
 `outrider gallery --page docs/gallery` makes this page.
 

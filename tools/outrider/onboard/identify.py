@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.flight.autopilots import Profile
 from companion.flight.autopilots.known import KNOWN, profile_of
 from companion.telemetry.sharing import onboard_heartbeat
-from mavlink_bridge.links.link import Link
+from mavlink_bridge.links.link import Link, failure_of
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
@@ -64,11 +64,16 @@ class Identification:
 
     @property
     def waiting(self) -> str:
-        """Description of the missing heartbeat, with the systems received and the count of refused frames."""
+        """Description of the missing heartbeat.
+
+        It has the systems received, the count of refused frames, and why there is no connection.
+        """
         refused = self._codec.counters.refused
         unsigned = f"; {refused} heartbeats there are not signed with the key" if refused else ""
         others = f"; heard there: {', '.join(map(str, sorted(self._others)))}" if self._others else ""
-        return f"a heartbeat of vehicle {self._system} on {self._endpoint}{others}{unsigned}"
+        failure = failure_of(self._link)
+        why = f"; no connection: {failure}" if failure else ""
+        return f"a heartbeat of vehicle {self._system} on {self._endpoint}{others}{unsigned}{why}"
 
     def _known(self, beat: Heartbeat) -> Heartbeat:
         if profile_of(beat) is None:

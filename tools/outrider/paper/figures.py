@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from outrider import legend
 from outrider.palette import OBSTACLE, TARGET, coloured, hex_of
 from outrider.paper.results import Result
 from outrider.paper.rows import Row
@@ -92,7 +93,7 @@ def _times(rows: Sequence[Row], results: Sequence[Result]) -> Figure:
     axes.set_xticks(places, [f"{row.scenario}\n{row.method}" for row in rows], fontsize=7, rotation=45)
     axes.set(ylabel="s to converge (hatched: stuck)", ylim=(0.0, top))
     axes.grid(axis="y", alpha=0.3)
-    axes.legend(loc="upper left")
+    legend.beside(axes)
     return figure
 
 

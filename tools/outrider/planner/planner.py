@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from itertools import count
-from typing import cast
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +31,7 @@ from outrider.planner.own_parts import OwnGoals, OwnMethods, OwnSurface
 from outrider.planner.surroundings import Surroundings
 from outrider.planner.values import Neighbour, Obstacle, Plan, Setpoint, Step, Target, microseconds
 
+Value = TypeVar("Value")
 Neighbours = Sequence[Neighbour] | Array
 """Neighbours, or an array (M, 6) of their positions (m) and velocities (m/s).
 
@@ -76,8 +77,19 @@ class Planner:
                 "certified": config.certified.model_copy(update={"fleet_time": "own"}),
             }
         )
+        if surface is not None and not callable(getattr(surface, "nearest", None)):
+            raise InputError(
+                f"surface: is a {type(surface).__name__}; allowed: an object with nearest(offset)"
+            )
+        own_methods = _sequence("methods", methods, "methods of the field")
+        for one in own_methods:
+            if not callable(getattr(one, "influence", None)):
+                raise InputError(
+                    f"methods: one is a {type(one).__name__}; "
+                    "allowed: objects with influence(scene, influence)"
+                )
         self.id = system_id("id", id)
-        self._surface, self._methods = surface, tuple(methods)
+        self._surface, self._methods = surface, own_methods
         self._fleet = FleetFrame(*checked("origin", origin, (3,), "deg, deg, m").tolist())
         self._local = self._fleet.local(self._fleet.latitude, self._fleet.longitude, self._fleet.altitude)
         self.reset()
@@ -173,7 +185,7 @@ class Planner:
 
     def _receive(self, now: int, packets: Iterable[bytes]) -> None:
         """Receive packets of other planners; what is no packet is ignored, as on a link."""
-        for packet in packets:
+        for packet in _sequence("packets", packets, "bytes"):
             if not isinstance(packet, bytes | bytearray):
                 raise InputError(f"packets: one is a {type(packet).__name__}; allowed: bytes")
             for message in self._codec.feed(bytes(packet), whole=True):
@@ -188,7 +200,7 @@ def _neighbours(given: Neighbours, own: int) -> tuple[Neighbour, ...]:
         ids = (k for k in count(1) if k != own)
         found = tuple(Neighbour(k, row[:3], row[3:]) for k, row in zip(ids, rows, strict=False))
     else:
-        found = tuple(given)
+        found = _sequence("neighbours", given, "Neighbour, or an array (M, 6)")
     known: set[int] = set()
     for one in found:
         if not isinstance(one, Neighbour):
@@ -207,10 +219,17 @@ def _obstacles(given: Obstacles) -> tuple[Obstacle, ...]:
     if isinstance(given, np.ndarray):
         rows = checked("obstacles", given, ("M", 4), "m: centre and radius")
         return tuple(Obstacle(row[:3], float(row[3])) for row in rows)
-    found = tuple(given)
+    found = _sequence("obstacles", given, "Obstacle, or an array (M, 4)")
     for one in found:
         if not isinstance(one, Obstacle):
             raise InputError(
                 f"obstacles: one is a {type(one).__name__}; allowed: Obstacle, or an array (M, 4)"
             )
     return found
+
+
+def _sequence(name: str, given: Iterable[Value], of: str) -> tuple[Value, ...]:
+    """Return ``given`` as a tuple; raise InputError if it is nothing that can be counted through."""
+    if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+        raise InputError(f"{name}: is a {type(given).__name__}; allowed: a sequence of {of}")
+    return tuple(given)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from companion.values.horizon import Array, Horizon, roll_out
 from outrider.arguments import checked, number, system_id
+from outrider.errors import InputError
 
 _ZERO = (0.0, 0.0, 0.0)
 
@@ -108,6 +109,8 @@ class Neighbour:
         system_id("id of a neighbour", self.id)
         object.__setattr__(self, "position", checked(f"position of {name}", self.position, (3,), "m"))
         object.__setattr__(self, "velocity", checked(f"velocity of {name}", self.velocity, (3,), "m/s"))
+        if self.plan is not None and not isinstance(self.plan, Plan):
+            raise InputError(f"plan of {name}: is a {type(self.plan).__name__}; allowed: a Plan, or None")
         if self.time is not None:
             number(f"time of {name}", self.time, "s")
 
@@ -129,6 +132,8 @@ class Obstacle:
         object.__setattr__(self, "position", checked("position of an obstacle", self.position, (3,), "m"))
         object.__setattr__(self, "velocity", checked("velocity of an obstacle", self.velocity, (3,), "m/s"))
         number("radius of an obstacle", self.radius, "m", least=0.0)
+        if not isinstance(self.upright, bool | np.bool_):
+            raise InputError(f"upright of an obstacle: is {self.upright!r}; allowed: True or False")
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,6 +183,7 @@ class RealTimeFlight:
             ),
             _punctuality(companions),
             [found.plan_log for found in companions],
+            self.fleet.vehicle.motion,
         )
 
 

@@ -10,12 +10,14 @@ import numpy as np
 from outrider.report import distances
 from outrider.report.loss import Losses
 from outrider.report.run import Array, Motions, Plans, PlanTimes, Run
-from outrider.report.thinning import largest, least
+from outrider.report.thinning import largest
 from outrider.runs.formation_error import standoff
 from outrider.runs.summary import yaw_errors
 from outrider.scenarios.starts import starts
 
 BINS = 80
+CENTIMETRE = 1e-2
+"""Step (m) of separations: they are shown with two decimals."""
 
 
 class Level(NamedTuple):
@@ -37,6 +39,8 @@ class Chart(NamedTuple):
     """Chart.
 
     The scale is linear below ``bent`` and logarithmic above it; if ``bent`` is 0, all of it is linear.
+    ``time`` (n,): times of the values (s), or None for the shown times. ``quantum``: step of the stored
+    values, or None for one that is invisible in the picture.
     """
 
     key: str
@@ -46,6 +50,8 @@ class Chart(NamedTuple):
     lines: tuple[Line, ...]
     levels: tuple[Level, ...] = ()
     bent: float = 0.0
+    time: Array | None = None
+    quantum: float | None = None
 
 
 class Histogram(NamedTuple):
@@ -71,7 +77,7 @@ def charts(
     ``late`` (s), by system id: how much a vehicle's clock is ahead (``clocks.errors``); the times of its
     plans are on that clock.
     """
-    found = [_separation(run, motions, shown)]
+    found = [_separation(run, motions)]
     where = _where(run, motions)
     if where is not None:
         title, note, values = where
@@ -110,7 +116,8 @@ def _lines(motions: Motions, values: Array) -> tuple[Line, ...]:
     )
 
 
-def _separation(run: Run, motions: Motions, shown: np.ndarray) -> Chart:
+def _separation(run: Run, motions: Motions) -> Chart:
+    """Return the chart of all samples: at every time it has the value that the run's file has there."""
     scenario, levels = run.scenario, []
     d_min, span = run.summary.get("d_min_m"), run.summary.get("span_m")
     if scenario is not None:
@@ -118,15 +125,29 @@ def _separation(run: Run, motions: Motions, shown: np.ndarray) -> Chart:
     for name, value in (("d_min", d_min), ("tip to tip", span)):
         if isinstance(value, int | float):
             levels.append(Level(name, float(value)))
-    lines = [Line("vehicle to vehicle", None, least(motions.separation, shown))]
+    lines = [Line("vehicle to vehicle", None, _finite(motions.separation))]
     if scenario is not None and scenario.d_min_target is not None:
-        target = least(np.min(distances.to_target(motions), axis=1), shown)
-        lines.append(Line("vehicle to target", None, target))
+        target = np.fmin.reduce(distances.to_target(motions), axis=1)
+        lines.append(Line("vehicle to target", None, _finite(target)))
     if scenario is not None and (scenario.obstacles or scenario.moving):
         surface = distances.to_obstacles(motions, scenario).min(axis=1)
-        lines.append(Line("vehicle to an obstacle's surface", None, least(surface, shown)))
+        lines.append(Line("vehicle to an obstacle's surface", None, _finite(surface)))
     note = "between centres, on true positions at every physics step in the air"
-    return Chart("separation", "Least separation", "m", note, tuple(lines), tuple(levels))
+    return Chart(
+        "separation",
+        "Least separation",
+        "m",
+        note,
+        tuple(lines),
+        tuple(levels),
+        time=motions.time,
+        quantum=CENTIMETRE,
+    )
+
+
+def _finite(values: Array) -> Array:
+    result: Array = np.where(np.isfinite(values), values, np.nan)
+    return result
 
 
 def _where(run: Run, motions: Motions) -> tuple[str, str, Array] | None:

@@ -40,9 +40,13 @@ TERMS = {
     "min_target_distance_m": Term("least distance to the target", "m", "where the target is an obstacle"),
     "min_obstacle_distance_m": Term("least distance to an obstacle", "m", "from a centre to a surface"),
     "d_min_m": Term("d_min", "m", "two vehicles nearer than this are a violation"),
+    "downwash": Term("downwash", "", "differences in height of two vehicles count divided by this"),
     "d_min_target_m": Term("d_min to the target", "m", ""),
     "d_min_obstacle_m": Term("d_min to obstacles", "m", ""),
     "span_m": Term("vehicle, tip to tip", "m", "two level vehicles nearer than this may touch"),
+    "motion": Term(
+        "motion", "", "multirotor: simulated physics; point: exactly as the set-points say, no physics"
+    ),
     "d_min_violations": Term("violations of d_min", "", "encounters, not samples"),
     "max_speed_m_s": Term("largest speed", "m/s", ""),
     "max_acceleration_m_s2": Term("largest acceleration", "m/s²", ""),

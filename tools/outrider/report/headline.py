@@ -60,7 +60,9 @@ def _facts(summary: dict[str, object], lost: float | None) -> Iterator[Fact]:
     """Yield the key figures that are available."""
     vehicles = _number(summary.get("vehicles"))
     if vehicles is not None:
-        yield Fact("vehicles", f"{vehicles:g}", str(summary.get("sensors") or ""))
+        points = summary.get("motion") == "point"
+        what = "points, without physics" if points else str(summary.get("sensors") or "")
+        yield Fact("vehicles", f"{vehicles:g}", what)
     for key, what, limit, name in _NEAR:
         least, against = _number(summary.get(key)), _number(summary.get(limit))
         if least is not None:

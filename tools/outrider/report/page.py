@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from html import escape
 from importlib.resources import files
 
+from outrider.palette import css
 from outrider.report.headline import Headline
 
 MARK = '<meta name="generator" content="outrider report">'
@@ -23,6 +24,7 @@ SCRIPTS = (
     "cursor.js",
     "camera.js",
     "glyphs.js",
+    "extent.js",
     "scene.js",
     "vehicles.js",
     "sight.js",
@@ -39,13 +41,19 @@ def static(name: str) -> str:
     return (files("outrider.report") / "static" / name).read_text(encoding="utf-8")
 
 
+def stylesheet() -> str:
+    """Return the style sheet, with the colours of ``palette`` as its variables."""
+    text = "\n".join(static(name) for name in STYLES)
+    return text.replace("{{light}}", css(dark=False)).replace("{{dark}}", css(dark=True))
+
+
 def page(title: str, headline: Headline, parts: Mapping[str, str], document: str | None) -> str:
     """Return the whole page.
 
     ``parts``: HTML by the names of the placeholders in the template. ``document``: the replay as JSON, or
     None to hide the replay and the charts.
     """
-    style = "\n".join(static(name) for name in STYLES)
+    style = stylesheet()
     script = '"use strict";\n(() => {\n' + "\n".join(static(name) for name in SCRIPTS) + "\n})();"
     values = {
         "mark": MARK,

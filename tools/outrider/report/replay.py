@@ -143,9 +143,10 @@ def _chart(chart: Chart) -> dict[str, Any]:
     values = np.stack([line.values for line in chart.lines], axis=1)
     most = float(np.abs(values[np.isfinite(values)]).max(initial=1e-6))
     # A chart is a few hundred pixels high; steps this small are invisible, and the values fit 16 bits.
-    quantum = most / 32_000.0
+    quantum = most / 32_000.0 if chart.quantum is None else chart.quantum
     return {
         **chart._replace(lines=(), levels=())._asdict(),
+        "time": None if chart.time is None else packed(chart.time, TENTH),
         "lines": [{"name": line.name, "system": line.system} for line in chart.lines],
         "levels": [level._asdict() for level in sorted(chart.levels, key=lambda level: -level.value)],
         "values": packed(values, quantum),

@@ -10,23 +10,25 @@ import numpy as np
 from outrider.report.run import Array, Motions, Run
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import starts
+from outrider.scene.airframe import HEXAROTOR, airframe
 
-SPAN = 0.63
-"""Default span (m) from tip to tip: the firefly's."""
 _MAX_SPAN = 100.0
 
 
 def scene(run: Run, motions: Motions) -> dict[str, Any]:
     """Return the scene; lengths in m, fleet-local ENU.
 
-    ``span`` is the vehicles' (m), ``dMin`` the least distance of the scenario, None if it is unknown.
-    ``fixed`` are posts and spheres, ``movers`` are in the order of the moving obstacles, ``surfaces`` are
-    lines as offsets from the target, and ``bystanders`` is the number of these vehicles.
+    ``airframe`` is the vehicles' shape (``Airframe``), ``dMin`` the least distance of the scenario, None if
+    it is unknown. ``fixed`` are posts and spheres, ``movers`` are in the order of the moving obstacles,
+    ``surfaces`` are lines as offsets from the target, and ``bystanders`` is the number of these vehicles.
     """
     scenario, span = run.scenario, run.summary.get("span_m")
+    frame = HEXAROTOR if scenario is None else airframe(scenario.vehicle)
+    if isinstance(span, int | float) and 0.0 < span < _MAX_SPAN:
+        frame = frame._replace(span=float(span))
     d_min = run.summary.get("d_min_m") if scenario is None else scenario.d_min
     return {
-        "span": float(span) if isinstance(span, int | float) and 0.0 < span < _MAX_SPAN else SPAN,
+        "airframe": frame._asdict(),
         "dMin": float(d_min) if isinstance(d_min, int | float) else None,
         "fixed": [] if scenario is None else [dict(_fixed(one)) for one in scenario.obstacles],
         "movers": []

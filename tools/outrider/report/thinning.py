@@ -1,6 +1,6 @@
 """Selection of the samples shown on the page: 25 per second, or fewer if there would be too many.
 
-``least`` and ``largest`` give the minima and maxima between two samples.
+``largest`` gives the maxima between two samples.
 """
 
 from __future__ import annotations
@@ -25,13 +25,6 @@ def chosen(motions: Motions) -> NDArray[np.intp]:
     usual = span / (count - 1) if count > 1 else PERIOD
     stride = max(1, round(PERIOD / usual), math.ceil(count * max(1, len(motions.system)) / MOST))
     return np.arange(count - 1, -1, -stride)[::-1]
-
-
-def least(values: Array, indices: NDArray[np.intp]) -> Array:
-    """Return the least (n, …) of ``values`` (T, …) since the sample shown before; NaN if none is finite."""
-    begins = np.concatenate([[0], indices[:-1] + 1])
-    result: Array = np.fmin.reduceat(np.where(np.isfinite(values), values, np.nan), begins, axis=0)
-    return result
 
 
 def largest(time: Array, values: Array, shown: Array) -> Array:

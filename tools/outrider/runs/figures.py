@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from outrider import legend
 from outrider.palette import LIMIT, OBSTACLE, TARGET, coloured, hex_of
 from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
@@ -27,7 +28,7 @@ def draw(flight: Outcome, summary: dict[str, Value], path: Path) -> None:
     from matplotlib.figure import Figure
 
     samples = flight.truth.samples()
-    figure = Figure(figsize=(13, 10.5), layout="constrained")
+    figure = Figure(figsize=(14, 10.5), layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(5, 2, width_ratios=(1.15, 1.0))
     _paths(figure.add_subplot(grid[:, 0]), flight, samples)
@@ -65,7 +66,7 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
     few = len(flight.systems) <= _MAX_NAMED_VEHICLES
     for k, system in enumerate(flight.systems):
         name = f"{system}" if few else "_nolegend_"
-        of = hex_of(k)
+        of = hex_of(k, flight.scenario.vehicles)
         axes.plot(samples.position[:, k, 0], samples.position[:, k, 1], lw=1.0, color=of, label=name)
         axes.plot(*samples.position[0, k, :2], "o", ms=4, mfc="none", color=of)
         axes.plot(*samples.position[-1, k, :2], "o", ms=5, color=of)
@@ -86,8 +87,7 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
     axes.set(title="paths from above (o start, ● end)", xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(loc="upper right", fontsize=8, ncols=2)
+    legend.below(axes, 8)
 
 
 def _separation(axes: Axes, flight: Outcome, samples: Samples, time: np.ndarray) -> None:
@@ -151,7 +151,7 @@ def _plan_time(axes: Axes, flight: Outcome) -> None:
         for q in (50, 99):
             level = float(np.percentile(values, q))
             axes.axvline(level, color="0.2", lw=0.9, ls=":", label=f"p{q} {level:.2f} ms")
-        axes.legend(fontsize=8, loc="upper right")
+        legend.beside(axes)
     axes.set(title="CPU time of a plan", xlabel="ms", ylabel="plans")
     axes.grid(alpha=0.3)
 
@@ -161,6 +161,4 @@ def _finish(axes: Axes, flight: Outcome) -> None:
     if flight.clock_end is not None and flight.clock_start is not None:
         axes.axvline((flight.clock_end - flight.clock_start) * 1e-6, color="0.6", lw=0.8)
     axes.grid(alpha=0.3)
-    handles, _ = axes.get_legend_handles_labels()
-    if handles:
-        axes.legend(fontsize=8, loc="upper right")
+    legend.beside(axes)

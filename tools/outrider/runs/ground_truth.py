@@ -55,12 +55,14 @@ class Samples(NamedTuple):
 class Limits(NamedTuple):
     """Least allowed distances (m): between centres, and from a centre to an obstacle's surface.
 
-    None: that distance is not checked.
+    None: that distance is not checked. ``downwash``: number by which differences in height of two vehicles
+    are divided.
     """
 
     vehicles: float
     target: float | None = None
     obstacles: float = 0.0
+    downwash: float = 1.0
 
 
 class Encounters:
@@ -103,6 +105,7 @@ class GroundTruth:
         self._pairs = np.triu_indices(vehicles, 1)
         self._fixed = obstacles if obstacles is not None and len(obstacles) else None
         self._vehicles = Encounters(len(self._pairs[0]), limits.vehicles)
+        self._downwash = limits.downwash
         self._target = Encounters(vehicles, 0.0 if limits.target is None else limits.target)
         self._moving = moving if moving is not None and len(moving) else None
         self._moves = 0 if self._moving is None else len(self._moving)
@@ -153,7 +156,8 @@ class GroundTruth:
             return
         lengths = [len(track) for track in self._tracks]
         track = np.concatenate(self._tracks)
-        distance = _distances(track, *self._pairs)
+        levelled = track if self._downwash == 1.0 else track / (1.0, 1.0, self._downwash)
+        distance = _distances(levelled, *self._pairs)
         self._vehicles.see(distance)
         parts = pairwise(accumulate(lengths, initial=0))
         self._least += [_least(distance[begin:end]) for begin, end in parts]
@@ -173,6 +177,12 @@ class GroundTruth:
         """Return positions and velocities (K, 3) of the last sample, and the target's position or None."""
         _, rows, place, _ = self._rows[-1]
         return rows[:, 0:3], rows[:, 3:6], None if np.isnan(place).any() else place
+
+    @property
+    def latest_separation(self) -> float:
+        """``Samples.separation`` (m) of the last sample."""
+        self._work_out()
+        return self._least[-1]
 
     def samples(self, since: int = 0, until: int | None = None) -> Samples:
         """Return all samples with ``since`` ≤ time < ``until``."""

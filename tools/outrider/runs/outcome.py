@@ -45,7 +45,7 @@ class Outcome:
     those whose goals are ``covered`` (their number), see ``CoveredGoals``. ``span`` (m): a vehicle's size
     from tip to tip. ``tallies``: for each companion its counters at ``clock_start`` and at ``clock_end``.
     ``punctuality`` is that of a real-time run; lock-step has none. ``plan_logs``: per companion, on its own
-    clock.
+    clock. ``motion``: multirotor, or point for vehicles without physics.
     """
 
     scenario: Scenario
@@ -65,6 +65,7 @@ class Outcome:
     messages: Messages
     punctuality: Punctuality | None = None
     plan_logs: Sequence[PlanLog] = ()
+    motion: str = "multirotor"
 
     @property
     def systems(self) -> list[int]:

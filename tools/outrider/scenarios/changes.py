@@ -5,16 +5,13 @@ from __future__ import annotations
 from copy import deepcopy
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 from pydantic_core import to_jsonable_python
 
 from outrider.errors import InputError
 from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
-from outrider.yaml_files.model_faults import model_flaws
-from outrider.yaml_files.schema_nodes import Schema
-from outrider.yaml_files.tree import parse
+from outrider.yaml_files.python_values import input_error
 from outrider.yaml_files.yaml_file import load
 
 
@@ -38,14 +35,7 @@ def changed(name: str, changes: dict[str, Any]) -> Scenario:
     try:
         return Scenario.model_validate(document)
     except ValidationError as error:
-        schema = Scenario.model_json_schema()
-        text = yaml.safe_dump(_plain(document), sort_keys=False, allow_unicode=True)
-        tree, _ = parse(text)
-        if tree is None:
-            raise
-        errors = error.errors(include_url=False, include_input=False)
-        flaws = model_flaws(tree, Schema(schema, schema), errors)
-        raise InputError(*(f"{name}, changed: {flaw.what}" for flaw in dict.fromkeys(flaws))) from None
+        raise input_error(error, Scenario, document, f"{name}, changed") from None
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

@@ -70,6 +70,12 @@ class AutopilotPart(Part):
         description="exact: a vehicle is where its set-points say; firmware: the firmware's position"
         " controller, with stock parameters, on the airframe of its own simulator",
     )
+    max_speed: float = Field(
+        10.0, gt=0.0, le=200.0, description="m/s, norm, of every reference of the autopilot"
+    )
+    max_acceleration: float = Field(
+        8.0, gt=0.0, le=200.0, description="m/s², norm, of every reference of the autopilot"
+    )
     guided_timeout: float = Field(3.0, ge=0.1, le=60.0, description="s, ArduPilot's GUID_TIMEOUT")
     offboard_timeout: float = Field(1.0, ge=0.1, le=60.0, description="s, PX4's COM_OF_LOSS_T")
 

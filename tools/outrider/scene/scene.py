@@ -11,11 +11,10 @@ from companion.config.companion import Obstacle
 from outrider.scenarios.moving import MovingPostPart
 from outrider.scenarios.scenario import FixedTarget, Scenario
 from outrider.scenarios.starts import starts
+from outrider.scene.airframe import HEXAROTOR, Airframe
 
 Array = NDArray[np.float64]
 Lever = Literal["pace", "methods", "loss", "target"]
-SPAN = 0.63
-"""m from tip to tip where nothing else is configured: the firefly's."""
 LEAST_REACH = 4.0
 """m: smallest reach of a view."""
 
@@ -32,21 +31,21 @@ class Solid(NamedTuple):
 class Scene(NamedTuple):
     """Static content of a view; lengths in m, fleet-local ENU.
 
-    ``systems`` (K): ids of the vehicles, of which the first ``tasked`` fly the task. ``d_min``: least allowed
-    distance between vehicles' centres; ``d_safe``: distance between centres below which the repulsive field
-    acts; ``d_min_target``: least allowed distance to the target; None where a distance is not known or does
-    not apply. ``d_min_solid``: least allowed distance from a centre to an obstacle's surface. ``movers`` (M):
-    shapes of the moving obstacles. ``goals`` (k, 3). ``surfaces``: closed lines (n, 3) as offsets from the
-    target. ``centre`` (3,) and ``reach``: the initial centre of the view, and the distance from there within
-    which the content lies. ``follows``: whether the view moves along with the vehicles. ``step_s``: step of
-    plans with separating planes; None for a fleet without them. ``levers``: what the view may change,
-    ``methods`` and ``loss`` as they are at first.
+    ``systems`` (K): ids of the vehicles, of which the first ``tasked`` fly the task; ``airframe``: their
+    shape. ``d_min``: least allowed distance between vehicles' centres; ``d_safe``: distance between centres
+    below which the repulsive field acts; ``d_min_target``: least allowed distance to the target; None where a
+    distance is not known or does not apply. ``d_min_solid``: least allowed distance from a centre to an
+    obstacle's surface. ``movers`` (M): shapes of the moving obstacles. ``goals`` (k, 3). ``surfaces``: closed
+    lines (n, 3) as offsets from the target. ``centre`` (3,) and ``reach``: the initial centre of the view,
+    and the distance from there within which the content lies. ``follows``: whether the view moves along with
+    the vehicles. ``step_s``: step of plans with separating planes; None for a fleet without them. ``levers``:
+    what the view may change, ``methods`` and ``loss`` as they are at first.
     """
 
     title: str
     systems: tuple[int, ...]
     tasked: int
-    span: float = SPAN
+    airframe: Airframe = HEXAROTOR
     d_min: float | None = None
     d_safe: float | None = None
     d_min_target: float | None = None
@@ -64,8 +63,8 @@ class Scene(NamedTuple):
     loss: float = 0.0
 
 
-def staged(scenario: Scenario, seed: int, span: float, levers: frozenset[Lever]) -> Scene:
-    """Return the scene of ``scenario`` for a seed; ``span`` (m) is the vehicles' size from tip to tip."""
+def staged(scenario: Scenario, seed: int, airframe: Airframe, levers: frozenset[Lever]) -> Scene:
+    """Return the scene of ``scenario`` for a seed; ``airframe`` is the vehicles' shape."""
     companion = scenario.companion
     begin = starts(scenario, seed, companion.planar)
     goals = np.empty((0, 3)) if begin.goals is None else np.asarray(begin.goals, dtype=np.float64)
@@ -79,7 +78,7 @@ def staged(scenario: Scenario, seed: int, span: float, levers: frozenset[Lever])
         scenario.name,
         tuple(scenario.systems),
         scenario.vehicles,
-        span,
+        airframe,
         scenario.d_min,
         companion.field.d_safe,
         scenario.d_min_target,

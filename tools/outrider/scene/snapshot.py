@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf, nan
+from math import inf, isnan, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +36,9 @@ class Snapshot(NamedTuple):
     Missing values are NaN. ``stage``: stage of the flight; ``position`` (K, 3); ``attitude`` (K, 4): w x y z
     of bodies with x forward, y left, z up; ``plan`` (K, KNOTS, 6): position and velocity at the knots, the
     last one repeated; ``target`` (3,); ``moving`` (M, 3); ``states`` (K,); ``views`` (K, 12): of cameras, see
-    ``camera_view``, or (0, 12) without any.
+    ``camera_view``, or (0, 12) without any. ``separation``: the flight's own least distance between two
+    vehicles in the air (``Samples.separation``) of the last sample, infinite without such a pair; NaN where
+    only reports are known.
     """
 
     time: float
@@ -48,6 +50,11 @@ class Snapshot(NamedTuple):
     moving: Single
     states: tuple[State, ...]
     views: Single = NO_VIEWS
+    separation: float = nan
+
+    def least_distance(self) -> float:
+        """Return the least distance of two vehicles (m), by reported positions if nothing better is known."""
+        return nearest(self.position).distance if isnan(self.separation) else self.separation
 
 
 class Pair(NamedTuple):
@@ -95,7 +102,7 @@ _OF_BODY = np.array([0.0, 1.0, 0.0, 0.0])
 
 def enu_attitude(attitude: Array) -> Array:
     """Convert attitudes of FRD bodies in NED to FLU bodies in ENU: quaternions (…, 4), w x y z."""
-    return _product(_product(_TO_ENU, attitude), _OF_BODY)
+    return product(product(_TO_ENU, attitude), _OF_BODY)
 
 
 def euler_attitude(roll: float, pitch: float, yaw: float) -> Array:
@@ -104,11 +111,11 @@ def euler_attitude(roll: float, pitch: float, yaw: float) -> Array:
     for axis, angle in ((3, yaw), (2, pitch), (1, roll)):
         turn = np.zeros(4)
         turn[0], turn[axis] = np.cos(0.5 * angle), np.sin(0.5 * angle)
-        result = _product(result, turn)
+        result = product(result, turn)
     return enu_attitude(result)
 
 
-def _product(a: Array, b: Array) -> Array:
+def product(a: Array, b: Array) -> Array:
     """Return the Hamilton product of quaternions ``a`` and ``b`` (…, 4), w x y z."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)

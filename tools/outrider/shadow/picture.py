@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from outrider import legend
 from outrider.palette import coloured
 from outrider.shadow.setpoints import TOGETHER, Course, course
 from outrider.shadow.shadow_run import ShadowRun
@@ -38,7 +39,7 @@ def draw(name: str, found: ShadowRun, path: Path) -> None:
             above.plot(east, north, color=colour, lw=0.9, label=words)
     above.set(title="from above", xlabel="east, m", ylabel="north, m")
     above.set_aspect("equal", adjustable="datalim")
-    above.legend(fontsize=8, loc="upper right")
+    legend.below(above, 3)
     first = None
     for row, (label, axis) in enumerate((("north, m", 0), ("east, m", 1), ("height, m", 2))):
         axes: Axes = figure.add_subplot(grid[row, 1], sharex=first)

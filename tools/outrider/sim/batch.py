@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from outrider.arguments import whole
+from outrider.arguments import number, whole
 from outrider.errors import InputError
 from outrider.resources import find
 from outrider.sim.frames import enu_attitudes, forward_left_up, swapped, turned_yaw, yaw_of
@@ -24,10 +24,17 @@ _DEFAULT_SPACING_M, _DEFAULT_HEIGHT_M = 3.0, 5.0
 
 
 def vehicle_config(vehicle: str | Path | VehicleConfig) -> VehicleConfig:
-    """Return the type of vehicle with this name, or from this file. Raises InputError."""
-    return (
+    """Return the type of vehicle with this name, or from this file. Raises InputError, also for a point."""
+    if not isinstance(vehicle, str | Path | VehicleConfig):
+        raise InputError(
+            f"vehicle: is a {type(vehicle).__name__}; allowed: a name, a file, or a VehicleConfig"
+        )
+    config = (
         vehicle if isinstance(vehicle, VehicleConfig) else load(find("vehicles", str(vehicle)), VehicleConfig)
     )
+    if config.motion == "point":
+        raise InputError(f"vehicle {config.name}: a point has no physics; allowed is motion: multirotor")
+    return config
 
 
 class Batch:
@@ -55,7 +62,7 @@ class Batch:
         self.config = config = vehicle_config(vehicle)
         self.dt = 1e-6 * config.physics_period
         """Length of a physics step, s."""
-        self._ground = ground
+        self._ground = ground = number("ground", ground, "m")
         self._airframe = airframe_record(airframe(config))
         rotors = len(config.rotors)
         self._states = np.zeros((count, STATE_SIZE + 2 * rotors))

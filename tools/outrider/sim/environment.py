@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from outrider.arguments import number, whole
 from outrider.errors import InputError
 from outrider.sim.batch import Batch
 from sitl.vehicle.airframe import FloatArray
@@ -44,11 +45,12 @@ class EscortVectorEnv(VectorEnv[NDArray[np.float32], FloatArray, NDArray[Any]]):
         max_acceleration: float = 5.0,
         seconds: float = 10.0,
     ) -> None:
+        num_envs, steps = whole("num_envs", num_envs, least=1), whole("steps", steps, least=1)
         self._batch = Batch(vehicle, num_envs)
-        if steps < 1 or min(radius, max_acceleration, seconds) <= 0.0:
-            raise InputError("steps, radius, max_acceleration, seconds: allowed are numbers above 0")
         self.num_envs, self._steps = num_envs, steps
-        self._radius, self._push = radius, max_acceleration
+        self._radius = number("radius", radius, "m", above=0.0)
+        self._push = number("max_acceleration", max_acceleration, "m/s²", above=0.0)
+        seconds = number("seconds", seconds, "s", above=0.0)
         self._longest = max(round(seconds / (steps * self._batch.dt)), 1)
         self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)

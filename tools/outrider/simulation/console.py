@@ -27,6 +27,7 @@ _WORDS = {
     "min_obstacle_distance_m": "least distance to an obstacle, m",
     "d_min_m": "d_min, m",
     "span_m": "vehicle tip to tip, m",
+    "motion": "vehicles are",
     "d_min_violations": "violations of d_min",
     "standoff_error_m": "stand-off error, m",
     "yaw_error_deg": "yaw error, deg",
@@ -113,6 +114,9 @@ def show(summary: Mapping[str, Value]) -> None:
     table = Table(title=f"{summary['scenario']} · {way} · seed {summary['seed']}", show_header=False)
     for key, words in _WORDS.items():
         value = summary.get(key)
+        if key == "motion":
+            # Multirotors are the usual; a point is named because its figures are those of plans.
+            value = "points, without physics" if value == "point" else None
         if value is None or value == "" or (isinstance(value, dict) and set(value.values()) == {None}):
             continue
         table.add_row(words, _text(value))

@@ -125,6 +125,7 @@ class Flight:
                 sum(part.bad_frames for part in parts),
             ),
             plan_logs=[log for part in parts for log in part.plan_logs],
+            motion=self.fleet.vehicle.motion,
         )
 
     def snapshots(self, now: int) -> list[VehicleSnapshot]:
@@ -174,7 +175,12 @@ def truth_of(scenario: Scenario) -> GroundTruth:
     """Return the collector of the true motions, with the scenario's distance limits and obstacles."""
     return GroundTruth(
         scenario.size,
-        Limits(scenario.d_min, scenario.d_min_target, scenario.d_min_obstacle),
+        Limits(
+            scenario.d_min,
+            scenario.d_min_target,
+            scenario.d_min_obstacle,
+            scenario.companion.field.downwash,
+        ),
         FixedObstacles(scenario.obstacles),
         MovingObstacles(scenario.moving_known),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib import import_module
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ from outrider.scenarios.scenario import RecordedTarget, Scenario
 from outrider.simulation.flight import Flight
 from outrider.simulation.targets import load as load_log
 from outrider.yaml_files.yaml_file import load
+from sitl.environment.weather import WeatherConfig
 from sitl.vehicle.config import VehicleConfig
 
 
@@ -57,10 +59,23 @@ def prepared(scenario: Scenario, where: str) -> Prepared:
         for index, fault in enumerate(scenario.faults)
         if isinstance(fault, MotorFailure) and fault.rotor > last
     ]
+    if vehicle.motion == "point":
+        wrong += [Fault(where, reason) for reason in _not_for_points(scenario)]
     wrong += [Fault(where, reason) for reason in obstacles_to(scenario, vehicle.span)]
     if wrong:
         raise InputError(*wrong)
     return Prepared(scenario, vehicle)
+
+
+def _not_for_points(scenario: Scenario) -> Iterator[str]:
+    """Yield what a scenario with points has and points have not."""
+    if scenario.physics != "own":
+        yield f"physics is {scenario.physics!r}; {scenario.vehicle} is a point, which needs physics: own"
+    if scenario.weather != WeatherConfig():
+        yield f"weather is given, but {scenario.vehicle} is a point, which wind does not move"
+    for index, fault in enumerate(scenario.faults):
+        if isinstance(fault, MotorFailure):
+            yield f"faults[{index}] is of a motor; {scenario.vehicle} is a point and has none"
 
 
 def measure(prepared: Prepared, seed: int) -> dict[str, Value]:

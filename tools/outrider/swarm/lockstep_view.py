@@ -65,4 +65,5 @@ def moment(flight: Flight, now: int) -> Snapshot:
         np.array(moving, dtype=np.float32).reshape(-1, 3),
         tuple(one.state for one in seen),
         np.array([one.view for one in vehicles]),
+        flight.truth.latest_separation,
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from outrider.realtime.view import RealTimeView
+from outrider.scene.airframe import airframe_of
 from outrider.scene.changes import Orders
 from outrider.scene.scene import Lever, staged
 from outrider.scene.view_commands import ViewCommands
@@ -56,7 +57,7 @@ class FlightView:
             self._viewer.wait()
 
     def _begin(self, prepared: Prepared, seed: int, levers: frozenset[Lever], commands: ViewCommands) -> None:
-        scene = staged(prepared.scenario, seed, prepared.vehicle.span, levers)
+        scene = staged(prepared.scenario, seed, airframe_of(prepared.vehicle), levers)
         self._viewer.begin(scene, commands)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from outrider.report.page import STYLES, static
+from outrider.report.page import stylesheet
 from outrider.runs import whole_file
 from outrider.sweep.report import METHOD, CellReport, Named, exit_status
 from outrider.sweep.table import rows
@@ -22,7 +22,7 @@ _STYLE = "img { max-width: 100%; background: #fff; } td.number { text-align: rig
 
 def write(path: Path, name: str, cells: Sequence[CellReport], picture: Path) -> None:
     """Write the page; ``picture`` is an existing PNG."""
-    style = "\n".join([*map(static, STYLES), _STYLE])
+    style = f"{stylesheet()}\n{_STYLE}"
     digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode("ascii")
     policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; "
     policy += "base-uri 'none'; form-action 'none'"

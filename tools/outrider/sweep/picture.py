@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from outrider import legend
 from outrider.palette import LIMIT, coloured
 from outrider.sweep.report import CellReport
 from outrider.sweep.runs import Ending, Run
@@ -55,8 +56,7 @@ def draw(name: str, cells: Sequence[CellReport], runs: Mapping[str, Sequence[Run
     for axes in (*curves, *spreads):
         axes.grid(alpha=0.3)
     for axes in curves:
-        if axes.get_legend_handles_labels()[0]:
-            axes.legend(fontsize=8, loc="lower right")
+        legend.beside(axes)
     figure.suptitle(_headline(name, cells))
     figure.savefig(path, dpi=110)
 

@@ -23,6 +23,7 @@ from outrider.interruption import noted
 from outrider.scenarios.scenario import TARGET_SYSTEM
 from outrider.terminal.share_progress import share_progress
 from outrider.view.listener import Listener
+from outrider.view.page_document import recorded_page
 from outrider.view.page_server import PageServer
 from outrider.view.player import Player, load
 from outrider.view.renderer import Renderer
@@ -133,7 +134,7 @@ def _html(player: Player, watch: Callable[[str, float], None]) -> str:
             stage.show(player.moment(at))
             recording.insert_sleep(_PICTURE_PERIOD_S)
             watch("drawing", (at - begin) / max(end - begin, _PICTURE_PERIOD_S))
-        return recording.as_html()
+        return recorded_page(recording.as_html(), player.scene.title)
     finally:
         page_server.stop()
 

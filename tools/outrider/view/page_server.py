@@ -10,6 +10,7 @@ import viser
 
 from outrider.scene.scene import Scene
 from outrider.scene.snapshot import Snapshot
+from outrider.view import camera
 from outrider.view.origin_check import guarded
 from outrider.view.panel import Panel
 from outrider.view.renderer import Renderer
@@ -33,15 +34,16 @@ class PageServer:
     """Page at ``host`` and ``port``, or at the next free port. ``url`` is its address."""
 
     def __init__(self, host: str, port: int) -> None:
+        self._stage: Renderer | None = None
+        self._panel: Panel | None = None
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)
-            with guarded(host):
+            with guarded(host, lambda: "" if self._stage is None else self._stage.scene.title):
                 self.server = Server(host=host, port=port, verbose=False)
         here = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::", "::1") else host
         self.url = f"http://{here}:{self.server.get_port()}"
         self.server.gui.add_markdown("No data has been received yet.")
-        self._stage: Renderer | None = None
-        self._panel: Panel | None = None
+        self.server.on_client_connect(self._connected)
 
     def run(self, source: Source, over: Callable[[], bool]) -> None:
         """Show ``source`` and pass view commands to it until ``over`` returns true."""
@@ -85,7 +87,14 @@ class PageServer:
         self.server.scene.reset()
         self.server.gui.reset()
         self._stage = Renderer(self.server, scene)
+        for client in self.server.get_clients().values():
+            self._connected(client)
         self._panel = Panel(self.server, self._stage, source.begin, source.span, source.hint)
+
+    def _connected(self, client: viser.ClientHandle) -> None:
+        """Show the whole scene also in a picture that is higher than wide: the first camera is for all."""
+        if self._stage is not None and client.camera.aspect < 1.0:
+            camera.whole(client.camera, self._stage.scene.reach, client.camera.aspect)
 
     def stop(self) -> None:
         """Stop the server."""

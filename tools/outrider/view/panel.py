@@ -10,11 +10,12 @@ import numpy as np
 import viser
 from viser import uplot
 
-from outrider.palette import hex_of
+from outrider.palette import BAD, VEHICLES, hex_of
 from outrider.scenarios.options import METHODS
 from outrider.scene.scene import Scene
 from outrider.scene.snapshot import Snapshot, nearest
 from outrider.scene.view_commands import ViewCommands
+from outrider.view import camera
 from outrider.view.renderer import Renderer
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4", "8", "as fast as it can")
@@ -60,13 +61,14 @@ class Panel:
             self._add_pace(span)
         if scene.levers & {"methods", "loss", "target"}:
             self._add_changes(scene)
+        self._add_cameras()
         self._table = gui.add_html("")
         self._plot = gui.add_uplot(
             (np.zeros(1), np.zeros(1), np.zeros(1)),
             (
                 uplot.Series(label="s"),
-                uplot.Series(label="nearest pair, m", stroke="#1f5fae", width=2),
-                uplot.Series(label="d_min, m", stroke="#b3261e", width=1),
+                uplot.Series(label="nearest pair, m", stroke=VEHICLES[0], width=2),
+                uplot.Series(label="d_min, m", stroke="#{:02x}{:02x}{:02x}".format(*BAD), width=1),
             ),
             scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
             height=190,
@@ -94,8 +96,10 @@ class Panel:
         """Add a point to the plot. A time before the last one clears the plot."""
         if self._series and moment.time < self._series[-1][0]:
             self._series.clear()
-        distance = nearest(moment.position).distance
-        self._series.append((moment.time, distance if isfinite(distance) else np.nan))
+        distance = moment.least_distance()
+        if isfinite(distance):
+            # The plot has no range with a value that is not finite.
+            self._series.append((moment.time, distance))
         if len(self._series) > 2 * POINTS:
             self._series = deque(list(self._series)[::2])
 
@@ -125,8 +129,8 @@ class Panel:
     def _headline(self, moment: Snapshot) -> str:
         pair, scene = nearest(moment.position), self._stage.scene
         near = ""
-        if isfinite(pair.distance):
-            near = f" · nearest {pair.distance:.2f} m ({scene.systems[pair.one]}–{scene.systems[pair.other]})"
+        if isfinite(distance := moment.least_distance()) and isfinite(pair.distance):
+            near = f" · nearest {distance:.2f} m ({scene.systems[pair.one]}–{scene.systems[pair.other]})"
         paused = " · paused" if self.commands.paused and "pace" in scene.levers else ""
         return f"**{moment.time:.1f} s** · {moment.stage}{paused}{near}"
 
@@ -156,6 +160,41 @@ class Panel:
             def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
                 if event.client is not None:
                     self.sought = float(slider.value)
+
+        # Letters and digits are all that viser's types know; its page compares any name of a key.
+        space = gui.add_command("Play or pause", hotkey="space")
+
+        @space.on_trigger
+        def _(_event: object) -> None:
+            self.commands = self.commands._replace(paused=not self.commands.paused)
+
+    def _add_cameras(self) -> None:
+        """Add what moves the camera of the browser that asks, and what follows the vehicles."""
+        gui, stage = self._gui, self._stage
+        views = gui.add_button_group("Camera", ("fit", "top"))
+        follow = gui.add_checkbox("Follow the vehicles", stage.follows)
+        whole, top = gui.add_command("Fit", hotkey="0"), gui.add_command("From above", hotkey="T")
+
+        def aim(client: viser.ClientHandle | None, name: str) -> None:
+            if client is not None:
+                to = camera.above if name == "top" else camera.whole
+                to(client.camera, stage.scene.reach, client.camera.aspect)
+
+        @views.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            aim(event.client, views.value)
+
+        @follow.on_update
+        def _(_event: object) -> None:
+            stage.follows = follow.value
+
+        @whole.on_trigger
+        def _(event: viser.CommandEvent) -> None:
+            aim(event.client, "fit")
+
+        @top.on_trigger
+        def _(event: viser.CommandEvent) -> None:
+            aim(event.client, "top")
 
     def _add_changes(self, scene: Scene) -> None:
         gui = self._gui
@@ -212,6 +251,8 @@ class Panel:
         if scene.step_s is not None:
             known["planes"] = "Separating planes"
         with gui.add_folder("Show", expand_by_default=False):
+            cell = self._stage.cell
+            gui.add_markdown(f"Lines on the ground: {cell:g} m apart, thick ones {5.0 * cell:g} m.")
             for name, label in known.items():
                 self._add_layer(name, label)
 
@@ -241,7 +282,7 @@ def table(scene: Scene, moment: Snapshot) -> str:
         if k == _MOST_ROWS:
             rows.append(f'<tr><td colspan="5">and {len(scene.systems) - k} more</td></tr>')
             break
-        colour = hex_of(k) if k < scene.tasked else "#5b6773"
+        colour = hex_of(k, scene.tasked)
         held = "–" if state.held is None else str(state.held)
         rows.append(
             f'<tr><td style="white-space:nowrap"><span style="color:{colour}">&#9679;</span> {system}</td>'

@@ -10,17 +10,14 @@ import numpy as np
 
 from mavlink_bridge.frames import FleetFrame
 from outrider.errors import Fault, InputError
-from outrider.resources import find
 from outrider.runs import names
 from outrider.runs.arrays import Motion, Plans
 from outrider.runs.source import read
-from outrider.scenarios.scenario import Scenario
-from outrider.scene.scene import SPAN, Scene, staged
+from outrider.scene.airframe import airframe
+from outrider.scene.recorded import Record, record
+from outrider.scene.scene import Scene, staged
 from outrider.scene.snapshot import Snapshot, State
 from outrider.scene.view_commands import ViewCommands
-from outrider.view.recorded import Record, record
-from outrider.yaml_files.yaml_file import load as load_yaml
-from sitl.vehicle.config import VehicleConfig
 
 PAST, PAST_EVERY = 20.0, 0.2
 """Length (s) of the trails that are drawn again after a jump, and the interval (s) of their samples."""
@@ -28,6 +25,7 @@ FAST = 16.0
 """Multiple of real time that is used if the chosen speed is None."""
 _STEP = 0.1
 """Duration of a single step (s)."""
+_ROUNDING_S = 1e-6
 
 Watch = Callable[[str, float], None]
 
@@ -92,7 +90,8 @@ class Player:
         It has the last sample at or before that time (or the first one) and the data of the logs.
         """
         motion = self._motion
-        row = max(int(np.searchsorted(motion.time_s, time, side="right")) - 1, 0)
+        # A time in s is not always exactly that of its sample.
+        row = max(int(np.searchsorted(motion.time_s, time + _ROUNDING_S, side="right")) - 1, 0)
         now = int(motion.time[row])
         return Snapshot(
             time,
@@ -104,6 +103,7 @@ class Player:
             motion.moving[row],
             tuple(self._state(k, time, now) for k in range(len(self.scene.systems))),
             np.array([one.view(now) for one in self._records]),
+            float(motion.separation[row]),
         )
 
     def _attitude(self, row: int, k: int, now: int) -> np.ndarray:
@@ -130,7 +130,7 @@ def load(directory: Path, watch: Watch = lambda _what, _share: None) -> Player:
         wrong = "holds no flight.npz: it was stopped; allowed: a run that came to its end, or tlog:PATH"
         raise InputError(Fault(str(directory), wrong))
     scenario = run.scenario
-    scene = staged(scenario, run.seed, _span(scenario), frozenset({"pace"}))
+    scene = staged(scenario, run.seed, airframe(scenario.vehicle), frozenset({"pace"}))
     paths = [directory / names.log(system) for system in scenario.systems]
     whole = max(sum(path.stat().st_size for path in paths if path.exists()), 1)
     origin, records, done = scenario.origin, [], 0
@@ -143,13 +143,6 @@ def load(directory: Path, watch: Watch = lambda _what, _share: None) -> Player:
         records.append(record(path, system, frame, at))
         done += path.stat().st_size if path.exists() else 0
     return Player(scene, run.motion, records, run.plan_times)
-
-
-def _span(scenario: Scenario) -> float:
-    try:
-        return float(load_yaml(find("vehicles", scenario.vehicle), VehicleConfig).span)
-    except InputError:
-        return SPAN
 
 
 def _of(plans: Plans | None, system: int) -> tuple[np.ndarray, np.ndarray]:

@@ -8,18 +8,17 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from outrider.palette import ACCENT, GRID, INK, LINE, RGB, SOFT, SOLID, colours, linear, rgb
+from outrider.palette import ACCENT, GRID, LINE, RGB, SOFT, SOLID, TARGET, colours, linear, rgb
 from outrider.scene.camera_view import field_lines, rays
+from outrider.scene.planes import MOST, Plane, between, facing
 from outrider.scene.scene import Scene, Solid
 from outrider.scene.snapshot import Array, Single, Snapshot
-from outrider.view import shapes
-from outrider.view.planes import MOST, Plane, between, facing
+from outrider.view import camera, shapes
+from outrider.view.bodies import AWAY, IDENTITY, Bodies
 from outrider.view.trails import Trails
 
 WORLD = "/world"
-AZIMUTH, ELEVATION, FIELD = -1.15, 0.5, np.radians(40.0)
-"""Initial view direction, as in the report, and field of view (rad)."""
-_AWAY = (0.0, 0.0, -1e4)
+_AWAY = AWAY
 _MAX_SIZE_FACTOR, _SIZE_SHARE = 3.0, 0.09
 """Limits of the drawn size of a vehicle.
 
@@ -28,8 +27,10 @@ value times the span.
 """
 _VIEW_SHARE = 0.18
 """Length of a drawn field of view, as a share of the scene's reach."""
-_TARGET = rgb("#17202a")
-_IDENTITY = (1.0, 0.0, 0.0, 0.0)
+_TARGET = rgb(TARGET)
+_IDENTITY = IDENTITY
+_SCALE_LABELS = 2
+"""Number of labelled distances in each direction from the middle of the ground."""
 _NO_LINE = np.zeros((1, 2, 3))
 
 
@@ -48,14 +49,14 @@ class Layers(NamedTuple):
 class Renderer:
     """``scene`` on ``server``.
 
-    All bodies are below one frame, which follows the vehicles if the scene requests that.
+    All bodies are below one frame, which moves against the vehicles while ``follows``: at first, if the scene
+    requests that.
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self._stage, self.scene = server.scene, scene
         stage, count = server.scene, len(scene.systems)
-        self._painted = colours(count)
-        self._painted[scene.tasked :] = SOFT
+        self._painted = colours(count, scene.tasked)
         self._colours = linear(self._painted)
         self._focus = np.array(scene.centre)
         self._layers = Layers()
@@ -68,8 +69,7 @@ class Renderer:
         self._stand()
         self._target = self._around_the_target()
         self._movers = [self._solid(f"mover-{j}", mover) for j, mover in enumerate(scene.movers)]
-        self._rotors = self._many("rotors", shapes.rotors(), self._colours, self.size)
-        self._frames = self._many("frames", shapes.frame(), linear(INK), self.size)
+        self._bodies = Bodies(stage, WORLD, scene.airframe, self.size, self._colours)
         self._shells = self._many(
             "shells", shapes.ball(0.5 * (scene.d_min or 0.0)), self._colours, 1.0, opacity=0.18
         )
@@ -111,13 +111,19 @@ class Renderer:
             )
             for system in scene.systems
         ]
-        self._look_at(server)
+        self.follows = scene.follows
+        camera.whole(server.initial_camera, scene.reach)
         self.layers = Layers()
 
     @property
     def focus(self) -> Array:
         """Point (3,) in the middle of the picture, fleet-local ENU."""
         return self._focus.copy()
+
+    @property
+    def cell(self) -> float:
+        """Distance (m) between two thin lines of the ground."""
+        return float(10.0 ** np.floor(np.log10(self.scene.reach / 3.0)))
 
     @property
     def layers(self) -> Layers:
@@ -143,8 +149,7 @@ class Renderer:
         there = np.asarray(np.isfinite(moment.position).all(axis=1))
         place = np.where(there[:, None], moment.position, _AWAY).astype(np.float32)
         attitude = np.where(np.isfinite(moment.attitude), moment.attitude, _IDENTITY).astype(np.float32)
-        for handle in (self._rotors, self._frames):
-            handle.batched_positions, handle.batched_wxyzs = place, attitude
+        self._bodies.show(moment.time, place, attitude)
         for handle in (self._shells, self._reach):
             handle.batched_positions = place
         for label, at in zip(self._labels, place.tolist(), strict=True):
@@ -161,7 +166,7 @@ class Renderer:
             mover.visible = bool(np.isfinite(at).all())
             if mover.visible:
                 mover.position = at
-        if self.scene.follows and there.any():
+        if self.follows and there.any():
             self._follow(moment.position[there].mean(axis=0))
 
     def _draw_plans(self, moment: Snapshot) -> None:
@@ -213,7 +218,8 @@ class Renderer:
         )
 
     def _ground(self) -> None:
-        cell = 10.0 ** np.floor(np.log10(self.scene.reach / 3.0))
+        """Add a grid with its scale: distances from the fleet's origin to the east and to the north."""
+        cell = self.cell
         self._stage.add_grid(
             f"{WORLD}/ground",
             infinite_grid=True,
@@ -226,6 +232,16 @@ class Renderer:
             fade_distance=14.0 * self.scene.reach,
             shadow_opacity=0.0,
         )
+        for n in (k for k in range(-_SCALE_LABELS, _SCALE_LABELS + 1) if k):
+            away = 5.0 * cell * n
+            for axis, place in (("E", (away, 0.0, 0.0)), ("N", (0.0, away, 0.0))):
+                self._stage.add_label(
+                    f"{WORLD}/scale-{axis}{n}",
+                    f"{away:g} m {axis}",
+                    font_screen_scale=0.6,
+                    anchor="top-left",
+                    position=place,
+                )
 
     def _stand(self) -> None:
         """Add what never moves: goals and obstacles."""
@@ -288,20 +304,12 @@ class Renderer:
             )
         return frame
 
-    def _look_at(self, server: viser.ViserServer) -> None:
-        distance = 1.05 * self.scene.reach / np.tan(0.5 * FIELD)
-        level = np.cos(ELEVATION)
-        direction = np.array([np.cos(AZIMUTH) * level, np.sin(AZIMUTH) * level, np.sin(ELEVATION)])
-        camera = server.initial_camera
-        camera.fov = float(FIELD)
-        camera.far = 100.0 * self.scene.reach
-        camera.look_at = (0.0, 0.0, 0.0)
-        camera.position = distance * direction
-
 
 def _drawn(scene: Scene) -> float:
     """Return the size (m) at which a vehicle is drawn."""
-    return float(min(max(scene.span, _SIZE_SHARE * scene.reach), _MAX_SIZE_FACTOR * scene.span))
+    return float(
+        min(max(scene.airframe.span, _SIZE_SHARE * scene.reach), _MAX_SIZE_FACTOR * scene.airframe.span)
+    )
 
 
 def _pool(found: Plane) -> tuple[Single, Single]:

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from outrider.scene.airframe import Airframe
+
 Array = NDArray[np.float64]
-_ROTORS = 6
 
 
 class Mesh(NamedTuple):
@@ -76,18 +77,28 @@ def cone(length: float, radius: float, at: float) -> Mesh:
     return Mesh(vertices, faces)
 
 
-def rotors() -> Mesh:
-    """Return six discs, 1 m from tip to tip; z is up."""
-    turn = pi * (np.arange(_ROTORS) + 0.5) / 3.0
-    return joined(*(prism(20, 0.16, 0.035, (0.34 * np.cos(a), 0.34 * np.sin(a), 0.05)) for a in turn))
+def rotors(airframe: Airframe) -> Mesh:
+    """Return the discs of the rotors of an airframe whose span is 1 m; z is up."""
+    return joined(*(prism(20, airframe.disc, 0.012, (x, y, 0.05)) for x, y in airframe.hubs))
 
 
-def frame() -> Mesh:
-    """Return the arms and the body that carry the rotors, and a nose along x."""
-    turn = pi * (np.arange(_ROTORS) + 0.5) / 3.0
-    ends = 0.34 * np.stack([np.cos(turn), np.sin(turn), np.zeros(_ROTORS)], axis=1)
+def blades(airframe: Airframe) -> Mesh:
+    """Return the two blades of one rotor along x, of an airframe whose span is 1 m."""
+    reach = np.array([0.95 * airframe.disc, 0.0, 0.0])
+    return joined(bar(-reach, reach, 0.028), prism(8, 0.03, 0.05))
+
+
+def frame(airframe: Airframe) -> Mesh:
+    """Return the body, and the arms with the motors, of an airframe whose span is 1 m."""
+    ends = [np.array([x, y, 0.0]) for x, y in airframe.hubs]
     arms = (bar(np.zeros(3), end, 0.04) for end in ends)
-    return joined(prism(12, 0.11, 0.1), cone(0.3, 0.08, 0.2), *arms)
+    motors = (prism(10, 0.045, 0.07, (x, y, 0.015)) for x, y in airframe.hubs)
+    return joined(prism(12, 0.11, 0.1), *arms, *motors)
+
+
+def nose() -> Mesh:
+    """Return a cone along x at the front of a body of 1 m span."""
+    return cone(0.2, 0.06, 0.1)
 
 
 def annulus(radius: float, width: float) -> Mesh:

@@ -41,6 +41,7 @@ COMMON: dict[str, dict[str, Any]] = {
     "epochs": {"certified": {"epoch_us": 400_000}},
     "heights": {"planar": True},
     "d_min": {"field": {"d_min": 0.5001}},
+    "downwash": {"field": {"downwash": 2.0}},
     "tube": {"certified": {"tube": 0.2501}},
     "drift": {"certified": {"drift": 0.5001}},
     "k": {"certified": {"sigmas": 3.001}},

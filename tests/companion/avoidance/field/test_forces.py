@@ -175,3 +175,17 @@ def test_limit_keeps_directions_and_never_exceeds_the_bound(force, bound):
     np.testing.assert_allclose(after, np.minimum(before, bound), rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(np.cross(limited, force), 0.0, atol=1e-6)
     assert (np.einsum("ni,ni->n", limited, force) >= 0.0).all()
+
+
+@LAWS
+@given(offset=vectors(2.0), downwash=numbers(1.0, 5.0))
+def test_with_downwash_the_force_is_a_gradient_of_the_distance_in_the_ellipsoid(offset, downwash):
+    """At rest: F(d) along (Δx, Δy, Δz/w²)/d, so twice as high is as near as once beside for w = 2."""
+    scale = np.array((1.0, 1.0, 1.0 / downwash))
+    distance = float(np.linalg.norm(scale * offset))
+    if distance < 1e-3:
+        return
+    own = np.broadcast_to(offset, (16, 3))
+    there = obstacles(np.zeros((1, 3)))._replace(heights=np.array([1.0 / downwash]))
+    expected = force_at(distance)[0] * scale**2 * offset / distance
+    np.testing.assert_allclose(push(own, there)[0], expected, atol=1e-9)

@@ -8,10 +8,12 @@ function chart(specification) {
   const box = html("figure", "chart");
   const caption = html("figcaption", "", `${specification.title}, ${specification.unit} `);
   caption.append(html("small", "", specification.note));
+  caption.append(...specification.levels.map((level) => levelName(level, specification.unit)));
   const picture = element("svg", { role: "img", "aria-label": specification.title });
   const values = html("p", "values");
   box.append(caption, picture, values);
-  const made = { ...specification, values: decode(specification.values), box, picture, told: values };
+  const times = specification.time ? decode(specification.time).values : flight.time;
+  const made = { ...specification, times, values: decode(specification.values), box, picture, told: values };
   made.row = made.lines.length;
   picture.addEventListener("pointerdown", (event) => {
     picture.setPointerCapture(event.pointerId);
@@ -22,6 +24,19 @@ function chart(specification) {
   picture.addEventListener("pointerleave", () => tellAt(made, cursor.time));
   drawn.push(made);
   return box;
+}
+
+// A limit beside its dashes: in the picture its name would cover data.
+function levelName({ name, value }, unit) {
+  const named = html("span", "named");
+  const svg = element("svg", { viewBox: "0 0 24 10", "aria-hidden": "true" });
+  svg.append(element("line", { class: levelClass(name), x1: 0, x2: 24, y1: 5, y2: 5 }));
+  named.append(svg, `${name} ${tick(value)} ${unit}`);
+  return named;
+}
+
+function levelClass(name) {
+  return name === "d_min" ? "level" : "level dim";
 }
 
 function timeAt(made, event) {
@@ -51,8 +66,8 @@ function render(made, wide) {
   const { picture } = made;
   picture.replaceChildren();
   picture.setAttribute("viewBox", `0 0 ${wide} ${TALL}`);
-  const first = place(cursor.from).index;
-  const last = place(cursor.to).next;
+  const first = place(cursor.from, made.times).index;
+  const last = place(cursor.to, made.times).next;
   let high = 0;
   for (const one of made.levels) high = Math.max(high, one.value * 1.05);
   for (let i = first; i <= last; i++) {
@@ -84,16 +99,9 @@ function render(made, wide) {
     const dashes = dashOf(k).join(" ");
     picture.append(element("path", { class: "line", d: path, stroke: colourOf(k), "stroke-dasharray": dashes }));
   }
-  let [right, above] = [wide - MARGIN.right, -Infinity];
   for (const { name, value } of made.levels) {
     const at = { x1: MARGIN.left, x2: wide - MARGIN.right, y1: y(value), y2: y(value) };
-    picture.append(element("line", { class: name === "d_min" ? "level" : "level dim", ...at }));
-    // Two that are close share a row.
-    const close = y(value) - above < 14;
-    right = close ? right - 105 : wide - MARGIN.right;
-    above = close ? above : y(value);
-    const text = { class: "named", x: right, y: above - 4, "text-anchor": "end" };
-    picture.append(element("text", text, `${name} ${tick(value)} ${made.unit}`));
+    picture.append(element("line", { class: levelClass(name), ...at }));
   }
   made.line = element("line", { class: "cursor", y1: MARGIN.top, y2: base });
   picture.append(made.line);
@@ -109,7 +117,7 @@ function outline(made, j, first, last, x, y) {
     let found = [];
     for (let n = i; n < Math.min(i + every, last + 1); n++) {
       const value = made.values.values[n * made.row + j];
-      if (!Number.isNaN(value)) found.push([flight.time[n], value]);
+      if (!Number.isNaN(value)) found.push([made.times[n], value]);
     }
     if (found.length > 2) {
       const sorted = [...found].sort((a, b) => a[1] - b[1]);
@@ -153,12 +161,17 @@ function follow(made) {
   tellAt(made, cursor.time);
 }
 
+// A separation has the two decimals that it has in the scene.
+function shown(made, value) {
+  return made.key === "separation" && Number.isFinite(value) ? value.toFixed(2) : figure(value);
+}
+
 function tellAt(made, time) {
-  const { index, next, share } = place(time);
+  const { index, next, share } = place(time, made.times);
   const parts = made.lines.map((line, j) => {
     const value = made.values.values[(share < 0.5 ? index : next) * made.row + j];
     const part = html("span");
-    part.append(swatch(lineIndex(made, j)), `${line.name} ${figure(value)}`);
+    part.append(swatch(lineIndex(made, j)), `${line.name} ${shown(made, value)}`);
     part.hidden = !visible(made, j);
     return part;
   });

@@ -2,26 +2,25 @@
 
 const run = JSON.parse(document.getElementById("run").textContent);
 
-// Ten that stay apart for the colour-blind too (M. Petroff, Accessible Color Sequences, 2021); after that dashes.
-const COLOURS = [
-  "#3f90da", "#ffa90e", "#bd1f01", "#94a4a2", "#832db6", "#a96b59", "#e76300", "#b9ac70", "#717581", "#92dadd",
-];
-// The same on a dark ground, the dark ones lighter.
-const LIT = [
-  "#4f9ee8", "#ffb020", "#ea4a30", "#a3b3b1", "#b06fe0", "#c38775", "#f0721a", "#c6ba82", "#9397a3", "#9be3e6",
-];
+// Ten colours, then the same with dashes.
+const COLOURS = 10;
 const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3]];
 
-function dark() {
-  return matchMedia("(prefers-color-scheme: dark)").matches && !("print" in document.documentElement.dataset);
+function stranger(k) {
+  return k >= flight.systems.length - run.scene.bystanders;
 }
 
+// Of lines and bodies, and of text, which needs more contrast.
 function colourOf(k) {
-  return (dark() ? LIT : COLOURS)[k % COLOURS.length];
+  return stranger(k) ? ink.bystander : ink[`vehicle-${k % COLOURS}`];
+}
+
+function labelColourOf(k) {
+  return stranger(k) ? ink.soft : ink[`label-${k % COLOURS}`];
 }
 
 function dashOf(k) {
-  return DASHES[Math.floor(k / COLOURS.length) % DASHES.length];
+  return DASHES[Math.floor(k / COLOURS) % DASHES.length];
 }
 
 // Whole multiples of a quantum, little endian as every browser is; the least integer is NaN.
@@ -50,8 +49,7 @@ const flight = run && {
 };
 
 // Where a time lies: between which samples, and how far from the first to the second.
-function place(time) {
-  const times = flight.time;
+function place(time, times = flight.time) {
   let low = 0;
   let high = times.length - 1;
   if (high < 1 || time <= times[0]) return { index: 0, next: 0, share: 0 };
@@ -102,15 +100,25 @@ function apart(a, b) {
   return Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-// The two vehicles that are nearest to each other: { distance, who: [j, k] }, or null.
-function nearestPair(places) {
-  let found = null;
+// The least distance of two vehicles, m: the run's own figure for the nearest sample, as in its chart and its file.
+const separation = run && run.charts.find((one) => one.key === "separation");
+const separations = separation && { times: decode(separation.time).values, values: decode(separation.values) };
+
+function separationAt(time) {
+  if (!separations) return NaN;
+  const { index, next, share } = place(time, separations.times);
+  return separations.values.values[(share < 0.5 ? index : next) * separations.values.row];
+}
+
+// The two vehicles that are nearest to each other: { distance, who: [j, k] }, or null if none are in the air.
+function nearestPair(places, time) {
+  const distance = separationAt(time);
+  let [least, who] = [Infinity, null];
   for (let j = 0; j < places.length; j++) {
     for (let k = j + 1; k < places.length; k++) {
-      if (!places[j] || !places[k]) continue;
-      const distance = apart(places[j], places[k]);
-      if (!found || distance < found.distance) found = { distance, who: [j, k] };
+      if (!places[j] || !places[k] || apart(places[j], places[k]) >= least) continue;
+      [least, who] = [apart(places[j], places[k]), [j, k]];
     }
   }
-  return found;
+  return who && Number.isFinite(distance) ? { distance, who } : null;
 }

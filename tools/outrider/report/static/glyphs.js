@@ -5,7 +5,8 @@ let ink = {};
 // The colours of the page as they are now: light, dark or on paper.
 function mix() {
   const style = getComputedStyle(document.documentElement);
-  const names = ["paper", "ink", "soft", "line", "grid", "bad", "accent", "solid"];
+  const names = ["paper", "ink", "soft", "line", "grid", "bad", "accent", "solid", "bystander", "target", "label-target", "shadow"];
+  for (let k = 0; k < COLOURS; k++) names.push(`vehicle-${k}`, `label-${k}`);
   ink = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
@@ -57,46 +58,63 @@ function cross(a, b) {
   return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 }
 
-// A multirotor: rotors around the axis of thrust, and a nose. Small ones are drawn larger than they are.
-function multirotor(g, centre, { yaw, axis }, span, colour) {
+// A multirotor: arms, hub, nose, and rotors that turn with the time shown. Small ones are drawn larger.
+function multirotor(g, centre, { yaw, axis }, colour, time) {
   const seen = project(centre);
   if (!seen) return;
-  const size = Math.max((span * camera.focus) / seen[2], Math.min(24, camera.width / 26)) * (seen[2] / camera.focus);
+  const { span, hubs, spins, disc } = run.scene.airframe;
+  const scale = pixelsPerMetre(seen[2]);
+  const size = Math.max(span * scale, Math.min(34, camera.width / 18)) / scale;
+  const pixels = size * scale;
   const forward = [Math.cos(yaw), Math.sin(yaw), 0];
   const lean = dot(forward, axis);
   let nose = forward.map((value, i) => value - lean * axis[i]);
   const length = Math.hypot(...nose) || 1;
   nose = nose.map((value) => value / length);
   const left = cross(axis, nose);
-  const rotor = size * 0.2;
-  const at = (turn, reach) =>
-    centre.map((value, i) => value + reach * (Math.cos(turn) * nose[i] + Math.sin(turn) * left[i]));
+  // In shares of the size: forward, left, up.
+  const at = (x, y, z = 0) => centre.map((value, i) => value + size * (x * nose[i] + y * left[i] + z * axis[i]));
+  g.lineCap = "round";
   g.strokeStyle = ink.ink;
-  g.lineWidth = 1.4;
-  for (let arm = 0; arm < 6; arm++) {
-    polyline(g, [centre, at(((arm + 0.5) * Math.PI) / 3, size * 0.34)]);
+  g.lineWidth = Math.max(1.2, 0.035 * pixels);
+  for (const [x, y] of hubs) {
+    polyline(g, [at(0, 0), at(x, y), at(x, y, 0.05)]);
     g.stroke();
   }
+  polyline(g, [at(0.1, 0.09), at(0.25, 0), at(0.1, -0.09)], true);
   g.fillStyle = colour;
-  g.lineWidth = 0.8;
-  for (let arm = 0; arm < 6; arm++) {
-    polyline(g, ring(at(((arm + 0.5) * Math.PI) / 3, size * 0.34), rotor * 0.8, nose, left, 14), true);
-    g.globalAlpha = 0.82;
+  g.fill();
+  polyline(g, ring(at(0, 0), 0.1 * size, nose, left, 14), true);
+  g.fillStyle = ink.ink;
+  g.fill();
+  hubs.forEach(([x, y], k) => {
+    const hub = at(x, y, 0.05);
+    polyline(g, ring(hub, disc * size, nose, left, 18), true);
+    g.fillStyle = g.strokeStyle = colour;
+    g.globalAlpha = 0.5;
     g.fill();
     g.globalAlpha = 1;
+    g.lineWidth = 1;
     g.stroke();
-  }
-  polyline(g, [at(0.9, size * 0.16), at(0, size * 0.72), at(-0.9, size * 0.16)], true);
-  g.fill();
-  g.stroke();
+    const turn = 2 * Math.PI * TURNS * time * spins[k] + k;
+    const [c, s] = [0.92 * disc * Math.cos(turn), 0.92 * disc * Math.sin(turn)];
+    polyline(g, [at(x - c, y - s, 0.05), at(x + c, y + s, 0.05)]);
+    g.strokeStyle = ink.ink;
+    g.lineWidth = Math.max(1, 0.025 * pixels);
+    g.stroke();
+  });
+  g.lineCap = "butt";
 }
+
+// Turns of a drawn rotor in a second of flight: a real one would be a blur.
+const TURNS = 1.7;
 
 // As large as a ball of this radius (m) looks.
 function ball(g, centre, radius, fill, edge, alpha) {
   const seen = project(centre);
   if (!seen) return;
   g.beginPath();
-  g.arc(seen[0], seen[1], (radius * camera.focus) / seen[2], 0, 2 * Math.PI);
+  g.arc(seen[0], seen[1], radius * pixelsPerMetre(seen[2]), 0, 2 * Math.PI);
   g.globalAlpha = alpha;
   g.fillStyle = fill;
   g.fill();

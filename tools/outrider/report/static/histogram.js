@@ -47,10 +47,10 @@ function renderBars(wide) {
   for (const value of steps(0, spent.most, wide / 80)) {
     picture.append(element("text", { x: x(value), y: TALL - 5, "text-anchor": "middle" }, tick(value)));
   }
-  [["p50", spent.p50, 0], ["p99", spent.p99, 12]].forEach(([name, value, lower]) => {
-    picture.append(element("line", { class: "mark", x1: x(value), x2: x(value), y1: MARGIN.top, y2: base }));
-    const right = x(value) > wide - 60;
-    const text = { x: x(value) + (right ? -4 : 4), y: MARGIN.top + 9 + lower, "text-anchor": right ? "end" : "start" };
-    picture.append(element("text", text, `${name} ${figure(value)}`));
-  });
+  // Their values are in the caption: here they would cover bars.
+  for (const [name, value] of [["p50", spent.p50], ["p99", spent.p99]]) {
+    const mark = element("line", { class: "mark", x1: x(value), x2: x(value), y1: MARGIN.top, y2: base });
+    mark.append(element("title", {}, `${name} ${figure(value)} ms`));
+    picture.append(mark);
+  }
 }

@@ -4,6 +4,7 @@ const PAPER = 430;
 const $ = (id) => document.getElementById(id);
 
 function start() {
+  mix();
   bounds = extent(run.from, run.to);
   Object.assign(cursor, { from: run.from, to: run.to, time: Math.max(run.from, Math.min(0, run.to)) });
   for (const one of run.charts) $("charts").append(chart(one));
@@ -12,7 +13,6 @@ function start() {
   $("sighted").hidden = !run.cameras;
   controls();
   watch(changed);
-  mix();
   resize();
   home();
   renderAll();
@@ -53,8 +53,7 @@ function vehicleButtons() {
     button.type = "button";
     button.title = "show or hide this vehicle everywhere";
     button.append(swatch(k), String(system));
-    const stranger = k >= flight.systems.length - run.scene.bystanders;
-    if (stranger) button.append(" (bystander)");
+    if (stranger(k)) button.append(" (bystander)");
     button.setAttribute("aria-pressed", String(!cursor.hidden.has(k)));
     button.addEventListener("click", () => {
       toggleVehicle(k);

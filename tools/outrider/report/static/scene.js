@@ -4,7 +4,8 @@ const show = { trail: 5, spheres: true, references: true, ids: true, cameras: tr
 
 function scene(g, time) {
   const here = place(time);
-  const places = flight.systems.map((_, k) => (cursor.hidden.has(k) ? null : vector(flight.position, k, here)));
+  const all = flight.systems.map((_, k) => vector(flight.position, k, here));
+  const places = all.map((point, k) => (cursor.hidden.has(k) ? null : point));
   const target = vector(flight.target, 0, here);
   const things = [];
   const add = (point, draw, nearer = 0) => point && things.push({ depth: depth(point) - nearer, draw });
@@ -15,57 +16,21 @@ function scene(g, time) {
   surfaces(g, target);
   if (target) add(target, () => star(g, target));
   trails(g, add, time);
-  const pair = nearestPair(places);
+  const pair = nearestPair(all, time);
   if (pair) nearest(g, add, places, pair);
   places.forEach((point, k) => point && vehicle(g, add, point, k, here, time));
   if (run.cameras && show.cameras) places.forEach((point, k) => point && sight(g, add, point, k, here));
   things.sort((a, b) => b.depth - a.depth);
   for (const { draw } of things) draw();
-  if (show.ids) places.forEach((point, k) => point && label(g, point, String(flight.systems[k]), colourOf(k)));
+  if (show.ids) places.forEach((point, k) => point && label(g, point, String(flight.systems[k]), labelColourOf(k)));
+  if (show.ids && target) label(g, target, "target", ink["label-target"]);
   return pair;
 }
 
 function label(g, point, text, colour) {
   const seen = project(point);
-  if (seen) words(g, text, seen[0], seen[1] - Math.max(16, (0.55 * camera.focus) / seen[2]), colour);
+  if (seen) words(g, text, seen[0], seen[1] - Math.max(19, 0.55 * pixelsPerMetre(seen[2])), colour);
 }
-
-// The box that holds all paths, obstacles and goals.
-function extent(from, to) {
-  const low = [Infinity, Infinity, 0];
-  const high = [-Infinity, -Infinity, 1];
-  const hold = (point, size = 0) => {
-    for (let i = 0; i < 3; i++) {
-      low[i] = Math.min(low[i], point[i] - (i < 2 ? size : 0));
-      high[i] = Math.max(high[i], point[i] + size);
-    }
-  };
-  flight.time.forEach((time, index) => {
-    if (time < from || time > to) return;
-    const here = { index, next: index, share: 0 };
-    flight.systems.forEach((_, k) => hold(vector(flight.position, k, here) ?? [0, 0, 0], 0.5));
-    const target = vector(flight.target, 0, here);
-    if (target) hold(target);
-    // Corners of what surrounds it are enough; it is round.
-    if (target && index % 10 === 0) {
-      for (const { line } of run.scene.surfaces) {
-        for (let i = 0; i < line.length; i += 9) hold(line[i].map((value, axis) => value + target[axis]));
-      }
-    }
-    run.scene.movers.forEach((mover, j) => {
-      const at = vector(flight.moving, j, here);
-      if (at) hold(at, mover.radius);
-    });
-  });
-  for (const one of run.scene.fixed) hold([one.at[0], one.at[1], one.kind === "sphere" ? one.at[2] : 0], one.radius);
-  for (const goal of run.scene.goals) hold(goal);
-  // Sixteen lines or fewer to a side.
-  const size = Math.max(high[0] - low[0], high[1] - low[1]);
-  const square = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].find((width) => size / width <= 16) ?? 2000;
-  return { low, high, square };
-}
-
-let bounds = null;
 
 // A grid on the ground with its scale along two edges.
 function ground(g) {
@@ -133,14 +98,15 @@ function solid(g, add, one, at) {
     add(middle, () => post(g, at, one.radius, postTop(one)));
   } else {
     add(at, () => ball(g, at, one.radius, ink.solid, ink.soft, 0.85));
-    shadow(g, at, one.radius, ink.soft);
+    shadow(g, at, one.radius);
   }
 }
 
-function shadow(g, at, radius, colour) {
-  polyline(g, level([at[0], at[1], 0], radius), true);
-  g.globalAlpha = 0.18;
-  g.fillStyle = colour;
+// On the ground, darker and smaller the lower the body is.
+function shadow(g, at, radius) {
+  polyline(g, level([at[0], at[1], 0], radius * (1 + 0.03 * Math.max(at[2], 0))), true);
+  g.globalAlpha = 0.12 + 0.25 / (1 + 0.25 * Math.max(at[2], 0));
+  g.fillStyle = ink.shadow;
   g.fill();
   g.globalAlpha = 1;
 }
@@ -169,7 +135,7 @@ function surfaces(g, target) {
 }
 
 function star(g, at) {
-  shadow(g, at, 0.25, ink.ink);
+  shadow(g, at, 0.25);
   stem(g, at, ink.soft);
   const [x, y] = project(at) ?? [];
   if (x === undefined) return;
@@ -179,9 +145,11 @@ function star(g, at) {
     g.lineTo(x + (i % 2 ? 4 : 10) * Math.cos(turn), y + (i % 2 ? 4 : 10) * Math.sin(turn));
   }
   g.closePath();
-  g.fillStyle = ink.ink;
+  g.fillStyle = ink.target;
+  g.strokeStyle = ink.ink;
+  g.lineWidth = 1;
   g.fill();
-  if (show.ids) words(g, "target", x, y - 18, ink.ink);
+  g.stroke();
 }
 
 function stem(g, at, colour) {

@@ -18,7 +18,7 @@ function field(g, at, [heading, pitch, roll], [across, down], colour) {
   const right = [sh, -ch, 0];
   const below = [sp * ch, sp * sh, -cp];
   const [cr, sr] = [Math.cos(roll), Math.sin(roll)];
-  const depth = 2.5 * run.scene.span;
+  const depth = 2.5 * run.scene.airframe.span;
   const [x, y] = [Math.tan(across / 2), Math.tan(down / 2)];
   const corners = [[-x, -y], [x, -y], [x, y], [-x, y]].map(([u, v]) =>
     at.map((value, i) => value + depth * (forward[i] + u * (cr * right[i] + sr * below[i]) + v * (cr * below[i] - sr * right[i]))),

@@ -27,7 +27,7 @@ function trails(g, add, time) {
 function piece(g, points, k, alpha) {
   polyline(g, points);
   g.globalAlpha = alpha;
-  g.strokeStyle = k < 0 ? ink.ink : colourOf(k);
+  g.strokeStyle = k < 0 ? ink.target : colourOf(k);
   g.lineWidth = k < 0 ? 1.4 : 2;
   g.setLineDash(k < 0 ? [2, 4] : dashOf(k));
   g.stroke();
@@ -37,13 +37,13 @@ function piece(g, points, k, alpha) {
 
 function vehicle(g, add, at, k, here, time) {
   const colour = colourOf(k);
-  const { span, dMin } = run.scene;
-  shadow(g, at, 0.5 * span, colour);
+  const { airframe, dMin } = run.scene;
+  shadow(g, at, 0.5 * airframe.span);
   stem(g, at, colour);
   if (show.spheres && dMin) add(at, () => ball(g, at, 0.5 * dMin, colour, colour, 0.1), -0.01);
   const reference = show.references && vector(flight.reference, k, here);
   if (reference) add(reference, () => followed(g, at, reference, colour));
-  add(at, () => multirotor(g, at, attitude(k, time), span, colour), 0.01);
+  add(at, () => multirotor(g, at, attitude(k, time), colour, time), 0.01);
 }
 
 // A small diamond, and a line to it.
@@ -64,6 +64,7 @@ function followed(g, at, reference, colour) {
 
 function nearest(g, add, places, { distance, who }) {
   const [a, b] = who.map((k) => places[k]);
+  if (!a || !b) return;
   const near = run.scene.dMin && distance < run.scene.dMin;
   const middle = a.map((value, i) => (value + b[i]) / 2);
   add(middle, () => {

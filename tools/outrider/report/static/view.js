@@ -14,6 +14,7 @@ function draw() {
   if (chasing) keepInMiddle();
   aim();
   const pair = scene(painter, cursor.time);
+  scaleBar(painter);
   const now = document.getElementById("now");
   const near = pair && run.scene.dMin && pair.distance < run.scene.dMin;
   now.classList.toggle("bad", Boolean(near));
@@ -28,10 +29,32 @@ function redraw() {
 }
 
 function keepInMiddle() {
-  const here = place(cursor.time);
-  const places = flight.systems.map((_, k) => vector(flight.position, k, here)).filter(Boolean);
+  const places = fleetAt(cursor.time);
   if (!places.length) return;
   camera.centre = [0, 1, 2].map((i) => places.reduce((sum, point) => sum + point[i], 0) / places.length);
+}
+
+function fleetAt(time) {
+  const here = place(time);
+  return flight.systems.map((_, k) => vector(flight.position, k, here)).filter(Boolean);
+}
+
+// A bar of a whole number of metres, true in the middle of the picture: with perspective near things are larger.
+function scaleBar(g) {
+  const pixels = pixelsPerMetre(camera.distance);
+  const metres = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500].findLast((n) => n * pixels <= 120) ?? 0.1;
+  const x = camera.width - 16 - metres * pixels;
+  const y = camera.height - 14;
+  const length = metres * pixels;
+  g.strokeStyle = ink.ink;
+  g.lineWidth = 1.5;
+  g.beginPath();
+  g.moveTo(x, y - 5);
+  g.lineTo(x, y);
+  g.lineTo(x + length, y);
+  g.lineTo(x + length, y - 5);
+  g.stroke();
+  words(g, `${metres} m`, x + length / 2, y - 10, ink.ink);
 }
 
 // The canvas has as many points as the screen has, or more for paper. A new size empties it: draw at once.
@@ -46,23 +69,52 @@ function resize(density = window.devicePixelRatio || 1) {
 
 function home() {
   chase(false);
+  flatten(false);
   camera.azimuth = -1.15;
   camera.elevation = camera.height > camera.width ? 0.85 : 0.55;
-  fit(bounds.low, bounds.high);
+  fit(bounds.points);
   redraw();
 }
 
+// Without perspective: a metre is as long everywhere, north is up.
 function fromAbove() {
+  flatten(true);
   camera.azimuth = -Math.PI / 2;
-  camera.elevation = Math.PI / 2 - 1e-3;
-  if (!chasing) fit(bounds.low, bounds.high);
+  camera.elevation = Math.PI / 2;
+  fit(chasing ? around(cursor.time) : bounds.points);
   redraw();
 }
 
+function flatten(on) {
+  camera.flat = on;
+  document.getElementById("top").setAttribute("aria-pressed", on);
+}
+
+// The camera moves with the fleet, as near to it as it may be.
 function chase(on) {
+  if (on && !chasing) fit(around(cursor.time));
   chasing = on;
   document.getElementById("chase").setAttribute("aria-pressed", on);
   redraw();
+}
+
+// The fleet, and what surrounds the target, at a time.
+function around(time) {
+  const places = fleetAt(time);
+  const target = vector(flight.target, 0, place(time));
+  if (target && run.scene.surfaces.length) {
+    places.push(target);
+    for (const { line } of run.scene.surfaces) {
+      for (let i = 0; i < line.length; i += 9) places.push(line[i].map((value, axis) => value + target[axis]));
+    }
+  }
+  if (!places.length) return bounds.points;
+  return places.flatMap((point) => [-1, 1].map((side) => point.map((value) => value + side)));
+}
+
+function turnBy(dx, dy) {
+  flatten(false);
+  orbit(dx, dy);
 }
 
 const fingers = new Map();
@@ -83,7 +135,7 @@ canvas.addEventListener("pointermove", (event) => {
   const [dx, dy] = [event.clientX - before[0], event.clientY - before[1]];
   if (fingers.size === 1) {
     if (event.buttons & 6 || event.shiftKey) pan(dx, dy);
-    else orbit(dx * 0.008, dy * 0.008);
+    else turnBy(dx * 0.008, dy * 0.008);
   } else {
     // Two fingers: what they have in common moves the scene, their distance zooms.
     const other = [...fingers].find(([id]) => id !== event.pointerId)[1];
@@ -126,9 +178,17 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 canvas.addEventListener("keydown", (event) => {
   const arrow = ARROWS[event.key];
   if (arrow && event.shiftKey) pan(arrow[0] * 25, arrow[1] * 25);
-  else if (arrow) orbit(arrow[0] * 0.08, arrow[1] * 0.08);
+  else if (arrow) turnBy(arrow[0] * 0.08, arrow[1] * 0.08);
   else if (KEYS[event.key] && !event.ctrlKey && !event.metaKey) KEYS[event.key]();
   else return;
   event.preventDefault();
   redraw();
+});
+
+// Space plays and pauses wherever the page has the focus, but on what space itself works.
+document.addEventListener("keydown", (event) => {
+  if (event.key !== " " || event.ctrlKey || event.metaKey || event.target === canvas) return;
+  if (event.target.closest?.("input:not([type=range]), select, textarea, button, summary, a")) return;
+  event.preventDefault();
+  play(!cursor.playing);
 });

@@ -1,0 +1,99 @@
+"""``outrider compare``: shipped files can be flown, faults are refused, results are counted."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from outrider.compare.cells import cells_of
+from outrider.compare.command import compare
+from outrider.compare.comparison import Comparison
+from outrider.compare.results import result_of
+from outrider.compare.table import lines, markdown
+from outrider.errors import InputError
+from outrider.resources import config_root, find
+from outrider.sweep.tasks import Entry, Task
+from outrider.yaml_files.yaml_file import load
+
+SHIPPED = sorted(path.stem for path in (config_root() / "comparisons").glob("*.yaml"))
+LINKS = {"swarm": {"delay_ms": 50.0, "loss": 0.0}}
+
+
+def flight(**changes: Any) -> dict[str, Any]:
+    """Return the figures of a flight that succeeds."""
+    found = dict.fromkeys(("path_m", "acceleration2", "jerk2", "stops", "most_speed"), 1.0)
+    found |= dict.fromkeys(("most_acceleration", "most_jerk", "plan_ms_p50", "plan_ms_p99"), 1.0)
+    found |= {"vehicles": 2, "arrived": 2, "mean_s": 5.0, "last_s": 6.0, "separation_m": 0.5}
+    return {**found, "held_epochs": 0, "solver_failures": 0, "failure": None, **changes}
+
+
+def fly(task: Task) -> dict[str, Any]:
+    """Stand in for a flight: the last arrival is the seed."""
+    return flight(last_s=float(task.seed))
+
+
+def entries(*flights: dict[str, Any] | None) -> list[Entry]:
+    """Return the entries of flights; None is one that raised an error."""
+    return [
+        Entry("k", seed, "fault" if one is None else "done", None, one, 1.0)
+        for seed, one in enumerate(flights, 1)
+    ]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_comparison_can_be_flown(name: str) -> None:
+    path = find("comparisons", name)
+    comparison = load(path, Comparison)
+    found = cells_of(comparison, path, comparison.rows, None)
+    assert len({cell.key for cell in found}) == len(comparison.rows)
+    assert comparison.differences
+    assert all(one.source for one in comparison.published)
+
+
+def test_collisions_late_flights_and_faults_are_no_success() -> None:
+    comparison = load(find("comparisons", "rmader"), Comparison)
+    row = comparison.rows[1]
+    late = flight(arrived=1, mean_s=None, last_s=None)
+    found = result_of(
+        comparison, row, LINKS, ("point", "point"), entries(flight(), flight(separation_m=0.2), late, None)
+    )
+    assert (found.seeds, found.succeeded, found.collided, found.not_arrived, found.failed) == (4, 1, 1, 1, 1)
+    assert (found.mean_s, found.worst_s, found.separation_m) == (5.0, 6.0, 0.2)
+    assert found.reaches_bar is False
+    assert found.success == 0.25
+    fine = result_of(comparison, row, LINKS, ("point", "point"), entries(flight(), flight()))
+    assert fine.reaches_bar is True
+    slow = result_of(comparison, row, LINKS, ("point", "point"), entries(flight(mean_s=60.0)))
+    assert slow.reaches_bar is False
+    *published, ours = lines(comparison, fine)
+    assert [words[0] for words in published] == [row.label] * len(published)
+    assert ours[2] == "2 of 2"
+    text = markdown(comparison, [fine])
+    assert all(one in text for one in comparison.differences)
+
+
+def test_rows_are_chosen_by_the_beginning_of_their_labels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = f"{__name__}:fly"
+    status = compare("rmader", 2, 1, tmp_path / "out", as_json=True, rows=("delay 50", "loss"), run=run)
+    document = json.loads(capsys.readouterr().out)
+    assert status == 0
+    assert [row["row"] for row in document["rows"]] == ["delay 50 ms", "loss 20 %", "loss 50 %"]
+    assert {row["worst_s"] for row in document["rows"]} == {2.0}
+    assert {row["motion"] for row in document["rows"]} == {"point"}
+    assert {one["row"] for one in document["published"]} == {"delay 50 ms"}
+    assert (tmp_path / "out" / "compare.md").is_file()
+
+
+def test_faults_are_refused_before_anything_flies(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such row; rows are delay 0 ms"):
+        compare("rmader", rows=("speed",), out=tmp_path / "out")
+    with pytest.raises(InputError, match="has one mission"):
+        compare("rmader", missions=tmp_path, out=tmp_path / "out")
+    with pytest.raises(InputError, match="did you mean 'rmader'"):
+        compare("rmade", out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,61 @@
+"""Cells of a comparison: each row as a checked scene."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from outrider.compare.comparison import Comparison, Row
+from outrider.compare.missions import folder_of
+from outrider.compare.scene import Places, Scene, document_of
+from outrider.errors import InputError
+from outrider.scenarios.scenario import Scenario
+from outrider.simulation.preparation import prepared
+from outrider.sweep.cells import Cell
+from outrider.sweep.grid import overlay
+from outrider.yaml_files.yaml_file import load, read
+
+_KEY_LENGTH = 20
+
+
+def cells_of(comparison: Comparison, where: Path, rows: Sequence[Row], folder: Path | None) -> list[Cell]:
+    """Return the cell of each of ``rows``, checked with the first seed; ``where`` is the comparison's file.
+
+    ``folder``: mission files in place of drawn ones. Raises InputError before anything is flown.
+    """
+    if folder is not None and comparison.missions is None:
+        raise InputError(f"--missions {folder}: {comparison.name} has one mission; allowed: no --missions")
+    file = where.parent / comparison.scenario
+    base: dict[str, Any] = load(file, Scenario).model_dump(mode="json")
+    found = []
+    for number, row in enumerate(rows, 1):
+        changed = overlay(base, {**comparison.set, **row.set})
+        count = changed["vehicles"]
+        given = []
+        if folder is not None and comparison.missions is not None:
+            given = folder_of(folder, int(str(count)), comparison.missions.offset)
+        scene = Scene(
+            scenario=changed,
+            measure=comparison.measure,
+            goal_radius=comparison.goal_radius,
+            vehicles=int(str(count)),
+            missions=comparison.missions,
+            given=tuple((_places(one.starts), _places(one.goals)) for one in given),
+        )
+        place = f"{where}: {row.label}"
+        # Read like a file, for the same messages.
+        scenario = read(json.dumps(document_of(scene, 1)).encode(), place, Scenario)
+        ready = prepared(scenario, place)
+        document, vehicle = scene.model_dump_json(), ready.vehicle.model_dump_json()
+        key = hashlib.sha256(json.dumps([document, vehicle]).encode()).hexdigest()[:_KEY_LENGTH]
+        found.append(
+            Cell(row.label, f"{number:03d}-{comparison.name}", key, document, vehicle, is_scene=False)
+        )
+    return found
+
+
+def _places(array: Any) -> Places:
+    return tuple((float(x), float(y), float(z)) for x, y, z in array)

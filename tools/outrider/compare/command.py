@@ -1,0 +1,107 @@
+"""Command ``outrider compare``: flies a published scene, resumable, and shows ours beside the published."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from outrider.compare import picture, table
+from outrider.compare.cells import cells_of
+from outrider.compare.comparison import Comparison, Row
+from outrider.compare.flying import RUN, TRACED
+from outrider.compare.results import Result, result_of
+from outrider.compare.scene import Scene
+from outrider.errors import InputError
+from outrider.interruption import INTERRUPTED
+from outrider.resources import find
+from outrider.runs import whole_file
+from outrider.sweep import directory as places
+from outrider.sweep.cells import Cell
+from outrider.sweep.comparison import Flown, flown
+from outrider.sweep.execution import header
+from outrider.yaml_files.yaml_file import load
+from sitl.vehicle.config import VehicleConfig
+
+DOCUMENT, MARKDOWN, PICTURE = "compare.json", "compare.md", "compare.png"
+
+
+def compare(
+    name: str,
+    seeds: int | None = None,
+    jobs: int | None = None,
+    out: Path | None = None,
+    as_json: bool = False,
+    rows: tuple[str, ...] = (),
+    missions: Path | None = None,
+    run: str = RUN,
+) -> int:
+    """Fly the comparison ``name``, a file or a shipped one, and return the exit status.
+
+    The status is 0 if every flight succeeded, 1 if one did not, and 3 after an interruption. A missed bar is
+    a result, not an error. ``rows``: labels to fly, or beginnings of labels; by default all. ``missions``: a
+    folder with mission files of LSC's planners, in place of drawn ones. Writes ``compare.json``,
+    ``compare.md`` and ``compare.png`` beside the journal in ``out`` (default ``runs/sweep-compare-NAME``).
+    """
+    path = find("comparisons", name)
+    comparison = load(path, Comparison)
+    chosen = _chosen(comparison, rows)
+    found = cells_of(comparison, path, chosen, missions)
+    title = f"compare-{comparison.name}"
+    folder = places.prepare(out, title)
+    numbers = range(TRACED, TRACED + (seeds or comparison.seeds))
+    entries = flown(header(title, found), found, numbers, folder, run, jobs)
+    if entries is None:
+        return INTERRUPTED
+    results = [
+        _result(comparison, row, cell, entries, numbers) for row, cell in zip(chosen, found, strict=True)
+    ]
+    document: dict[str, Any] = {
+        "comparison": comparison.name,
+        "description": comparison.description,
+        "measure": comparison.measure.model_dump(),
+        "goal_radius_m": comparison.goal_radius,
+        "rows": [result.document() for result in results],
+        "published": [
+            one.model_dump() for one in comparison.published if one.row in {row.label for row in chosen}
+        ],
+        "differences": list(comparison.differences),
+    }
+    whole_file.write(folder / DOCUMENT, json.dumps(document, indent=2) + "\n")
+    whole_file.write(folder / MARKDOWN, table.markdown(comparison, results))
+    _draw(comparison, found, entries, folder)
+    if as_json:
+        sys.stdout.write(json.dumps(document) + "\n")
+    else:
+        table.show(comparison, results)
+    sys.stderr.write(f"table, Markdown and picture: {folder}\n")
+    return 0 if all(result.succeeded == result.seeds for result in results) else 1
+
+
+def _chosen(comparison: Comparison, labels: tuple[str, ...]) -> tuple[Row, ...]:
+    """Return the rows whose labels begin with one of ``labels``; all without labels."""
+    known = ", ".join(row.label for row in comparison.rows)
+    for label in labels:
+        if not any(row.label.startswith(label) for row in comparison.rows):
+            raise InputError(f"--row {label}: {comparison.name} has no such row; rows are {known}")
+    return tuple(
+        row for row in comparison.rows if not labels or any(row.label.startswith(label) for label in labels)
+    )
+
+
+def _result(comparison: Comparison, row: Row, cell: Cell, entries: Flown, numbers: range) -> Result:
+    scene = Scene.model_validate_json(cell.document)
+    vehicle = VehicleConfig.model_validate_json(cell.vehicle, strict=True)
+    of_row = [entries[cell.key, seed] for seed in numbers]
+    return result_of(comparison, row, scene.scenario["links"], (vehicle.name, vehicle.motion), of_row)
+
+
+def _draw(comparison: Comparison, found: list[Cell], entries: Flown, folder: Path) -> None:
+    traces = {}
+    for cell in found:
+        summary = entries[cell.key, TRACED].summary
+        if summary is not None and "trace" in summary:
+            traces[cell.label] = summary["trace"]
+    if traces:
+        picture.draw(f"{comparison.name}, seed {TRACED}: paths from above", traces, folder / PICTURE)
