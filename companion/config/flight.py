@@ -57,6 +57,16 @@ class GuardConfig(Settings):
         description="m/s in addition to the target's speed: limit for a vehicle that flies cautiously, as "
         "after missed deadlines or without messages of a neighbour",
     )
+    unheard_us: Micros | None = Field(
+        None,
+        description="µs: a vehicle slows down near a neighbour that has lately been silent for longer, and"
+        " the distances to it grow (field); null: it does not",
+    )
+    unheard_speed: Positive = Field(
+        1.0,
+        description="m/s: a vehicle near an unheard neighbour is no faster on each axis, and the distances to"
+        " that neighbour grow at this rate, until neighbour_lost_us",
+    )
     late_us: Micros = Field(100_000, description="µs: a step that is later is a missed deadline")
     battery_low: float = Field(
         0.2, ge=0.0, le=1.0, description="share left below which the vehicle returns and lands"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import hypot, inf
 from typing import Protocol
 
@@ -38,6 +39,14 @@ _BLOCKED_WITHIN_M, _NO_PROGRESS_TIMEOUT_US = 5.0, 10_000_000
 """A vehicle within this distance of its start that has come no nearer for this time is back, too."""
 
 _NO_MATES, _NO_SIGHT = Mates(), Sight()
+
+Pace = Callable[[Array, Array], float]
+"""Speed (m/s) that is allowed from a place (3,) in a direction (3,), both m."""
+
+
+def _any_pace(_place: Array, _towards: Array) -> float:
+    """Return ∞: no neighbour is unheard."""
+    return inf
 
 
 class Flight(Protocol):
@@ -129,6 +138,7 @@ class Goals:
         mates: Mates = _NO_MATES,
         smaller_ids: int = 0,
         sight: Sight = _NO_SIGHT,
+        pace: Pace = _any_pace,
         *,
         cautious: bool,
     ) -> Aim:
@@ -136,14 +146,18 @@ class Goals:
 
         ``cautious`` limits the distance to the destination to what ``guard.cautious_speed`` covers within a
         horizon. ``obstacles``: what settling keeps clear of. ``mates``: those that share the surface.
-        ``smaller_ids``: how many neighbours have a smaller id. ``sight``: of the target. Raises SurfaceError
-        if the function of a user's surface fails.
+        ``smaller_ids``: how many neighbours have a smaller id. ``sight``: of the target. ``pace``: the
+        speed (m/s) that is allowed from a place (3,) in a direction (3,). Raises SurfaceError if the function
+        of a user's surface fails.
         """
         step = self._config.guard.return_step
         self._lane = step * smaller_ids + self._clearance if step else 0.0
         aim = self._destination(now, view, measured, obstacles, mates, sight)
-        speed = self._config.guard.cautious_speed
-        return aim if speed is None or not cautious else self._shortened(aim, measured, speed)
+        limit = self._config.guard.cautious_speed
+        speed = inf if limit is None or not cautious else limit
+        offset = aim.destination - (aim.target_end - aim.target) - measured.position
+        speed = min(speed, pace(measured.position, offset))
+        return aim if speed == inf else self._shortened(aim, measured, speed)
 
     def _shortened(self, aim: Aim, measured: Motion, speed: float) -> Aim:
         """Return the aim in the same direction, but no further than ``speed`` (m/s) covers in a horizon.

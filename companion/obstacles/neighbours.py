@@ -26,6 +26,7 @@ from companion.obstacles.relevance_filter import Ages, RelevanceFilter
 from companion.obstacles.shared_plans import SharedPlans
 from companion.obstacles.trusted_peers import TrustedPeers, follows
 from companion.obstacles.uncertainty import ReportedUncertainty
+from companion.obstacles.unheard import Unheard
 from companion.values.horizon import Array
 from companion.values.mates import Mates
 from companion.values.obstacles import Obstacles
@@ -115,6 +116,7 @@ class Neighbours:
         self._heights: Array = np.full(_SYSTEM_IDS, 1.0 / config.field.downwash)
         self._d_min: Array = np.full(_SYSTEM_IDS, config.field.d_min + margin)
         self._d_safe: Array = np.full(_SYSTEM_IDS, config.field.d_safe + margin)
+        self._unheard = None if config.guard.unheard_us is None else Unheard(config)
         self.refused_plans = 0
         self.closest = inf
         """m: least distance to a neighbour so far, by its messages; updated if ``guard.near`` is set."""
@@ -294,6 +296,9 @@ class Neighbours:
             # Plans, too, begin at the neighbour's own estimate of its position.
             radii = self._uncertainty.radii(ids)
             further = radii if further is None else further + radii
+        if self._unheard is not None:
+            unsure = self._unheard.radii(age)
+            further = unsure if further is None else further + unsure
         if further is None or not further.any():
             return found
         return found._replace(
@@ -314,6 +319,33 @@ class Neighbours:
         if guard.flown_on_us:
             meant = limit(self._table.accelerations(ids, times), self._config.limits.a_total)
         return flown_on(states, meant, most, np.where(late, 0.0, 1e-6 * guard.plan_stale_us))
+
+    def pace(self, now: int, place: Array, towards: Array) -> float:
+        """Return the speed (m/s) with which a vehicle at ``place`` (3,), m, may fly ``towards`` (3,), m.
+
+        It is ∞ unless neighbours have been unheard for ``guard.unheard_us``, see ``Unheard``.
+        """
+        if self._unheard is None or not self._ids:
+            return inf
+        age, here = self._extrapolated(now)
+        return self._unheard.pace(now, age, here, place, towards)
+
+    def confine(self, now: int, place: Array, speed: float) -> bool:
+        """Return whether a vehicle at ``place`` (3,), m, must be slow because of neighbours that are unheard.
+
+        ``speed`` (m/s): its present one, see ``Unheard``.
+        """
+        if self._unheard is None or not self._ids:
+            return False
+        age, here = self._extrapolated(now)
+        return self._unheard.confined(now, age, here, place, speed)
+
+    def _extrapolated(self, now: int) -> tuple[Ages, Array]:
+        """Return age (M,), µs, and extrapolated position (M, 3), m, of all neighbours."""
+        self._update_rows()
+        age, here = now - self._times, np.empty((len(self._ids), 3))
+        extrapolate(self._states, age, self._config.neighbour.extrapolate_us, here)
+        return age, here
 
     def nearest(self, now: int, own: State | None) -> tuple[int, float] | None:
         """Return system id and distance (m) of the neighbour nearest to the ``own`` position.

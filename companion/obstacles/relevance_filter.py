@@ -73,6 +73,9 @@ class RelevanceFilter:
         self._max_age_s = 1e-6 * min(
             _MAX_AGE_US, config.neighbour.extrapolate_us, config.guard.neighbour_lost_us // 4
         )
+        if config.guard.unheard_us is not None:
+            # Neighbours that are ignored must not count as unheard.
+            self._max_age_s = min(self._max_age_s, 0.5e-6 * config.guard.unheard_us)
         self._extrapolate_us = max(config.neighbour.extrapolate_us, config.guard.flown_on_us)
         # Largest distance (m) of a silent vehicle from its extrapolation at constant velocity.
         self._acceleration_drift = config.limits.a_total * float(

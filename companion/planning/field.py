@@ -190,6 +190,8 @@ class FieldAvoidance:
         """Make a plan towards ``aim``; return its positions (N + 1, 3), m, or None if the old one is kept."""
         horizon, config = self.guard.horizon, self._config.horizon
         state = self.guard.anchor(now, situation.measured)
+        speed = float(np.linalg.norm(state.velocity))
+        self.planner.confine(slow=self._world.neighbours.confine(now, state.position, speed))
         started = self._times.stopwatch()
         try:
             prediction = (

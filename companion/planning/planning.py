@@ -120,7 +120,10 @@ class Planning:
             sight = _NO_SIGHT
             if isinstance(self._config.formation, Perception):
                 sight = self._world.sight(now, self._avoidance.lookahead_s)
-            aim = self._goals.aim(now, view, measured, obstacles, mates, below, sight, cautious=cautious)
+            pace = partial(self._world.neighbours.pace, now)
+            aim = self._goals.aim(
+                now, view, measured, obstacles, mates, below, sight, pace, cautious=cautious
+            )
         except SurfaceError:
             return None
         if self._config.traffic is None:

@@ -32,10 +32,11 @@ from mavlink_bridge.wire.framing import (
     STARTS,
     Flaw,
     Frame,
+    at_boundary,
     claimed_length,
     frame_at,
-    incompatible,
     leading_frames,
+    skipped_to,
     without_signature,
 )
 
@@ -137,14 +138,12 @@ class TlogWriter:
         """Yield the records of ``data`` from ``at`` on, where an irregularity begins."""
         while at < len(data):
             frame = frame_at(data, at)
-            foreign = incompatible(data, at) if frame is Flaw.INCOMPATIBLE else None
-            if foreign and (foreign.verified or _is_frame_boundary(data, at + foreign.length)):
-                at += foreign.length
-                self.skipped_bytes += foreign.length
-                continue
-            if isinstance(frame, Flaw) or not (frame.known or _is_frame_boundary(data, at + len(frame.data))):
-                at += 1
-                self.skipped_bytes += 1
+            if isinstance(frame, Flaw) or not (frame.known or at_boundary(data, at + len(frame.data))):
+                foreign = frame is Flaw.INCOMPATIBLE
+                end = skipped_to(data, at, whole=True) if foreign else Flaw.FALSE_START
+                after = at + 1 if isinstance(end, Flaw) else end
+                self.skipped_bytes += after - at
+                at = after
                 continue
             at += len(frame.data)
             recorded = _recorded(frame)
@@ -171,11 +170,6 @@ def _leading(data: bytes) -> tuple[tuple[bytes, ...], int, int]:
     frames, at = leading_frames(data)
     recorded = [part for frame in frames if (part := _recorded(frame)) is not None]
     return (b"", *recorded), len(frames) - len(recorded), at
-
-
-def _is_frame_boundary(data: bytes, at: int) -> bool:
-    """Return whether the datagram ends or a frame begins at ``at``: the only check of an unknown message."""
-    return at == len(data) or STARTS.match(data, at) is not None
 
 
 def _is_gzip(head: bytes) -> bool:

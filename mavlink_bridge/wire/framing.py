@@ -66,8 +66,7 @@ class Frame(NamedTuple):
 class Flaw(Enum):
     """Reason why there is no frame: the bytes end too early, or no valid frame starts here.
 
-    ``INCOMPATIBLE``: a frame with an incompatibility flag that is not understood, ``incompatible`` has its
-    length.
+    ``INCOMPATIBLE``: a frame with an incompatibility flag that is not understood; ``skipped_to`` has its end.
     """
 
     PARTIAL = "partial"
@@ -75,26 +74,30 @@ class Flaw(Enum):
     INCOMPATIBLE = "incompatible"
 
 
-class Incompatible(NamedTuple):
-    """Frame whose incompatibility flags are not understood.
+def at_boundary(data: bytes, at: int) -> bool:
+    """Return whether ``data`` ends or a frame may begin at ``at``: the only check of an unverified frame."""
+    return at == len(data) or data[at] in _MARKERS
 
-    ``length`` in bytes, by its header. ``verified``: its checksum is correct.
+
+def skipped_to(data: bytes, start: int, *, whole: bool) -> int | Flaw:
+    """Return where the incompatible frame at ``data[start]``, which ``frame_at`` found, ends.
+
+    Such a frame is skipped if its checksum is correct, or if a start byte follows it, or, if ``whole``, the
+    end of ``data``. ``Flaw.PARTIAL``: this depends on bytes that follow ``data``. ``Flaw.FALSE_START``: no
+    frame begins here.
     """
-
-    length: int
-    verified: bool
-
-
-def incompatible(data: bytes, start: int) -> Incompatible | None:
-    """Return the incompatible frame at ``data[start]``, which ``frame_at`` found; None if it is cut off."""
     flags = data[start + 2]
     length, signature = _lengths(data[start + 1], flags)
-    if length > len(data) - start:
-        return None
-    message_id, end = start + (10 if flags & _LONG_IDS else 7), start + length - signature - 2
+    after = start + length
+    if after > len(data):
+        return Flaw.FALSE_START if whole else Flaw.PARTIAL
+    message_id, end = start + (10 if flags & _LONG_IDS else 7), after - signature - 2
     extra = CRC_EXTRA.get(int.from_bytes(data[message_id : message_id + 3], "little"))
-    checked = extra is not None and mcrf4xx(data[start + 1 : end] + extra) == data[end] | data[end + 1] << 8
-    return Incompatible(length, checked)
+    if extra is not None and mcrf4xx(data[start + 1 : end] + extra) == data[end] | data[end + 1] << 8:
+        return after
+    if after == len(data) and not whole:
+        return Flaw.PARTIAL
+    return after if at_boundary(data, after) else Flaw.FALSE_START
 
 
 def _lengths(payload: int, flags: int) -> tuple[int, int]:
@@ -277,17 +280,12 @@ class Framer:
         while at < size:
             frame = frame_at(data, at)
             if frame is Flaw.INCOMPATIBLE:
-                foreign = incompatible(data, at)
-                if foreign is None:
-                    frame = Flaw.PARTIAL
-                else:
-                    after = at + foreign.length
-                    if after == size and not whole and not foreign.verified:
-                        break
-                    if foreign.verified or after == size or data[after] in _MARKERS:
-                        self.unknown += 1
-                        at = after
-                        continue
+                end = skipped_to(data, at, whole=whole)
+                if not isinstance(end, Flaw):
+                    self.unknown += 1
+                    at = end
+                    continue
+                frame = end
             if frame is Flaw.PARTIAL and not whole:
                 break
             if not isinstance(frame, Flaw):
@@ -298,7 +296,7 @@ class Framer:
                     continue
                 if after == size and not whole:
                     break
-                if after == size or data[after] in _MARKERS:
+                if at_boundary(data, after):
                     self.unknown += 1
                     if self._returns_unknown:
                         found.append(frame)

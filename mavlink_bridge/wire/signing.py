@@ -24,6 +24,12 @@ LATEST: Final = (1 << 48) - 1
 """Last possible stamp, in the year 2104."""
 MINUTE: Final = 6_000_000
 """Steps of a stamp in a minute: the first stamp of a new stream may be this far behind the newest stamp."""
+LEAD: Final = 366 * 24 * 60 * MINUTE
+"""Steps of a stamp by which a sender's clock may lead the own one, where that is known: a year.
+
+Computers without a battery for their clock may be months behind. But a stamp at the end of time would make
+every honest stamp look old.
+"""
 STREAMS: Final = 256
 """Largest number of remembered streams; only a holder of the key can create a stream."""
 RADIOS: Final = frozenset((mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO))
@@ -36,6 +42,7 @@ class Refusal(Enum):
     UNSIGNED = "not signed"
     FORGED = "signed with another key"
     OLD = "old, or heard before"
+    AHEAD = "more than a year ahead of this clock"
 
 
 class Signing:
@@ -62,6 +69,8 @@ class Signing:
         self._streams: dict[tuple[int, int, int], int] = {}
         self._floor = 0
         self._began = False
+        self._clock = 0
+        """The own time as a stamp; 0 where it is not known."""
 
     def present(self, unix: int) -> None:
         """Set the current time to ``unix`` (µs).
@@ -71,6 +80,7 @@ class Signing:
         recorded before a restart. A new key ends this refusal.
         """
         stamp = (unix - EPOCH) // UNIT
+        self._clock = max(stamp, 0)
         if stamp > self.newest:
             self.newest = min(stamp, LATEST)
         if not self._began:
@@ -123,6 +133,8 @@ class Signing:
             return Refusal.OLD
         if not hmac.compare_digest(key.signature(data[:-6]), data[-6:]):
             return Refusal.FORGED
+        if self._clock and stamp > self._clock + LEAD:
+            return Refusal.AHEAD
         # Stored only after the signature is verified. Otherwise a forged stamp in the future would block the
         # true sender until that time.
         self._remember(stream, stamp)

@@ -89,6 +89,17 @@ class Planner:
         self.dqmpc = Dqmpc(self.config.horizon, self.config.cost, limits)
         flown_us = self.config.guard.hold_us + self.config.rates.replan_us
         self._walls = Walls(limits, self.dqmpc.dt, 1e-6 * flown_us)
+        self._fast = self.dqmpc, self._walls
+        self._slow = None
+        if self.config.guard.unheard_us is not None:
+            speed = self.config.guard.unheard_speed
+            slower = limits.model_copy(update={"v_max": tuple(min(v, speed) for v in limits.v_max)})
+            dqmpc = Dqmpc(self.config.horizon, self.config.cost, slower)
+            self._slow = dqmpc, Walls(slower, dqmpc.dt, 1e-6 * flown_us)
+
+    def confine(self, *, slow: bool) -> None:
+        """Plan with at most ``guard.unheard_speed`` on each axis, or again as fast as the limits allow."""
+        self.dqmpc, self._walls = self._fast if self._slow is None or not slow else self._slow
 
     def plan(
         self,

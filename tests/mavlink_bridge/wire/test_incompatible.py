@@ -14,11 +14,14 @@ from mavlink_bridge.links.link import memory_pair
 from mavlink_bridge.messages import Heartbeat, Source
 from mavlink_bridge.tlog.log import TlogReader, TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
+from mavlink_bridge.wire.framing import Framer
 
 BEAT = Heartbeat(Source(7, 1), 2, 3, 0, 5, 4)
 INNER = Codec().encode(Heartbeat(Source(9, 1), 2, 3, 128, 4, 4))
 OUTER = Codec().encode(BEAT)
 STATUSTEXT = mavlink.MAVLINK_MSG_ID_STATUSTEXT
+SHORTENED = b"\xfd\x09\x80" + OUTER[3:]
+"""It claims flags that nobody knows, and its checksum is of the frame without them."""
 STRANGE = st.integers(2, 255)
 
 
@@ -53,6 +56,21 @@ def test_nothing_inside_is_received_and_all_around_is(frames, cuts):
     assert found == [BEAT] * (len(frames) + 1)
     assert codec.counters.bad == codec.counters.skipped_bytes == 0
     assert codec.counters.unknown == len(frames)
+
+
+@given(
+    parts=st.lists(st.one_of(FRAMES, st.just(OUTER), st.just(SHORTENED), st.binary(max_size=20)), max_size=5)
+)
+def test_a_log_skips_what_a_link_skips(parts, tmp_path_factory):
+    data = b"".join(parts)
+    framer = Framer(unknown=True)
+    received = [frame.data for frame in framer.feed(data, whole=True)]
+    path = tmp_path_factory.getbasetemp() / "one.tlog"
+    with TlogWriter(path) as log:
+        log.write(1_000_000, 0, data)
+    logged = path.read_bytes()
+    stamp = (1_000_000).to_bytes(8, "big")
+    assert logged == b"".join(stamp + frame for frame in received)
 
 
 @given(frame=FRAMES)

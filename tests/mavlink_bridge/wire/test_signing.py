@@ -11,7 +11,7 @@ from mavlink_bridge import messages as m
 from mavlink_bridge.key import Key
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import without_signature
-from mavlink_bridge.wire.signing import LATEST, MINUTE, RADIOS, STREAMS, Refusal, Signing
+from mavlink_bridge.wire.signing import LATEST, LEAD, MINUTE, RADIOS, STREAMS, Refusal, Signing
 from tests.mavlink_bridge.signers import KEY, ME, NOW, SECOND, beat, frame_of, peer, signed, signing, stamp_at
 from tests.mavlink_bridge.wire.test_codec import UNKNOWN_TO_PEER, any_message
 
@@ -151,7 +151,7 @@ def test_what_is_refused_is_counted_by_its_reason() -> None:
     reader = Codec(None, mine)
     good = signed(STAMP + 1)
     reader.feed(good + good + signed(STAMP + 9, key=OTHER) + Codec().encode(beat()))
-    assert mine.refused == {Refusal.OLD: 1, Refusal.FORGED: 1, Refusal.UNSIGNED: 1}
+    assert mine.refused == {Refusal.OLD: 1, Refusal.FORGED: 1, Refusal.UNSIGNED: 1, Refusal.AHEAD: 0}
     assert mine.latest is Refusal.UNSIGNED
     assert reader.counters == (1, 0, 0, 0, 0, 3)
 
@@ -215,6 +215,27 @@ def test_at_the_end_of_time_nothing_breaks(stamp: int) -> None:
     assert codec.encode(beat())
     mine.present(2**62)
     assert codec.encode(beat())
+
+
+def test_a_holder_of_the_key_at_the_end_of_time_locks_nobody_out() -> None:
+    mine = signing()
+    assert mine.check(frame_of(signed(LATEST))) is Refusal.AHEAD
+    assert mine.check(frame_of(signed(STAMP + LEAD + 1))) is Refusal.AHEAD
+    newcomer = m.Source(77, 1)
+    assert mine.check(frame_of(signed(STAMP + 1, source=newcomer))) is None
+    # Nor the sender whose ids it used, nor is what is sent from here stamped so.
+    assert mine.check(frame_of(signed(STAMP + 2))) is None
+    assert mine.newest == STAMP + 2
+    assert mine.check(frame_of(signed(STAMP + LEAD))) is None
+
+
+@given(stamps)
+def test_a_stamp_counts_as_far_ahead_as_the_own_clock_allows(stamp: int) -> None:
+    clockless, mine = Signing(KEY), signing()
+    clockless.present(0)
+    frame = frame_of(signed(stamp))
+    assert (mine.check(frame) is Refusal.AHEAD) == (stamp > STAMP + LEAD)
+    assert clockless.check(frame) is not Refusal.AHEAD
 
 
 # Memory

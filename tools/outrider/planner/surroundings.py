@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 import numpy as np
 
@@ -101,6 +102,14 @@ class Surroundings:
             (one.id, self._time_of(one), np.asarray(one.position), np.asarray(one.velocity))
             for one in self._neighbours
         ]
+
+    def pace(self, _now: int, _place: Array, _towards: Array) -> float:
+        """Return ∞: the caller says where the neighbours are, so none is unheard."""
+        return inf
+
+    def confine(self, _now: int, _place: Array, _speed: float) -> bool:
+        """Return False: no neighbour is unheard."""
+        return False
 
     def mates(self, now: int) -> Mates:
         """Return the neighbours that share a plan which is not too old."""
