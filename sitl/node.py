@@ -44,6 +44,7 @@ from sitl.autopilot.parameters import px4 as px4_parameters
 from sitl.autopilot.parameters.values import Values
 from sitl.autopilot.plant import Plant
 from sitl.autopilot.reception import Reception
+from sitl.autopilot.records import Records
 from sitl.autopilot.saved import Saved
 from sitl.autopilot.services import Services
 from sitl.autopilot.trust import SigningSetup
@@ -57,7 +58,7 @@ from sitl.estimation.sensors import Estimate
 from sitl.snapshot import SnapshotReader
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
-from sitl.telemetry.streams import usual_rates
+from sitl.telemetry.streams import further_rates, usual_rates
 from sitl.values.origin import Origin
 from sitl.vehicle.airframe import hover_speeds
 from sitl.vehicle.battery import Battery
@@ -144,6 +145,22 @@ class Autopilot:
         self._clock = OwnClock(config)
         self._commander, self._failsafes = control.commander, control.failsafes
         self._telemetry = Telemetry(usual_rates(config), self._firmware.reports_ekf)
+        self._records = records = Records(
+            source,
+            self._firmware,
+            self._commander,
+            plant,
+            self._origin,
+            navigation.home,
+            self._clock,
+            self._values,
+            self._outbox,
+            reporter,
+            records=config.streams == "normal",
+        )
+        records.report(self._telemetry)
+        if (further := further_rates(config)) is not None:
+            self._telemetry.stream(*further)
         self._missions = MissionService(
             source,
             navigation.plans,
@@ -174,6 +191,7 @@ class Autopilot:
             self._outbox,
             reporter,
             self._configure,
+            records.parts,
         )
         self._snapshots = SnapshotReader(
             config,
@@ -189,6 +207,7 @@ class Autopilot:
             self._missions.current,
             self._failsafes,
             self._clock,
+            records.flight,
         )
         commands = self._services.commands | control.maneuvers.commands
         self._reception = Reception(
@@ -237,9 +256,9 @@ class Autopilot:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Advance to ``now`` (µs), process the received datagrams, then return the messages due.
 
-        The result is one datagram or none, and more only after a flood of requests. All messages about one
-        image are in one datagram. Messages received at ``now`` take effect from ``now`` on. The first call is
-        the boot.
+        The result is one datagram or none, and more only after a flood of requests and in a download. All
+        messages about one image are in one datagram. Messages received at ``now`` take effect from ``now``
+        on. The first call is the boot.
         """
         if self._boot is None:
             self._boot = now
@@ -263,6 +282,7 @@ class Autopilot:
             self._clock.locate(self._now)
         if self._commander.ready and not was_ready:
             self._telemetry.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+        self._records.watch(self._now)
         if self._battery is not None and self._battery.due(self._now):
             self._battery.advance(self._now, self._plant.state.rotor_speeds.tolist())
         if self._now >= self._failsafes.next_due:

@@ -7,7 +7,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from mavlink_bridge.messages import MissionCurrent, Source
+from mavlink_bridge.messages import MissionCurrent, Source, Vector
 from sitl.autopilot.commander import Commander
 from sitl.autopilot.failsafes import Failsafes
 from sitl.autopilot.firmware import Firmware, Mode
@@ -15,7 +15,7 @@ from sitl.autopilot.guidance import Activity, Guidance
 from sitl.autopilot.own_clock import OwnClock
 from sitl.autopilot.plant import Plant
 from sitl.config.autopilot import AutopilotConfig
-from sitl.telemetry.reports import Snapshot
+from sitl.telemetry.reports import Flight, Snapshot
 from sitl.telemetry.status_reports import version
 from sitl.values.home import Home
 from sitl.values.origin import Origin
@@ -51,6 +51,7 @@ class SnapshotReader:
         mission: Callable[[], MissionCurrent],
         failsafes: Failsafes,
         clock: OwnClock,
+        flight: Flight,
     ) -> None:
         self._config = config
         self._source = source
@@ -64,6 +65,8 @@ class SnapshotReader:
         self._mission = mission
         self._failsafes = failsafes
         self._clock = clock
+        self._flight = flight
+        self._fastest = vehicle.omega_max
         self._version = version(source, config.flavour)
         self._rotors = len(vehicle.rotors)
         self._hovering = _squares(hover_speeds(vehicle).tolist())
@@ -112,6 +115,9 @@ class SnapshotReader:
             self._failsafes.fence_status,
             self._lift,
             lambda: plant.state,
+            self._demand,
+            self._motors,
+            self._flight,
         )
 
     def _armable(self, now: int) -> bool:
@@ -131,6 +137,17 @@ class SnapshotReader:
         guidance = self._guidance
         follows = guidance.activity is Activity.TRACK or guidance.activity is Activity.GO
         return guidance.wanted(self._now) if follows else None
+
+    def _demand(self) -> tuple[Vector, float] | None:
+        """Return the acceleration (m/s², local NED) and yaw (rad) that the controller aims at, or None."""
+        reference = self._plant.course.reference
+        if reference is None:
+            return None
+        return self._origin.vector_to_local(reference.acceleration), reference.yaw - self._origin.turn
+
+    def _motors(self) -> tuple[float, ...]:
+        """Return the rotor speeds over the greatest one."""
+        return tuple(speed / self._fastest for speed in self._plant.state.rotor_speeds.tolist())
 
     def _startup_progress(self) -> float:
         """Return the start-up progress of GPS and filter, 0…1."""

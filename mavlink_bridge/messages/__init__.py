@@ -14,11 +14,14 @@ from __future__ import annotations
 
 from mavlink_bridge.messages.cameras import *
 from mavlink_bridge.messages.commands import *
+from mavlink_bridge.messages.components import *
 from mavlink_bridge.messages.declaration import BY_ID, BY_TYPE, Converter, Message
 from mavlink_bridge.messages.links import *
+from mavlink_bridge.messages.logs import *
 from mavlink_bridge.messages.missions import *
 from mavlink_bridge.messages.motion import *
 from mavlink_bridge.messages.origin import *
+from mavlink_bridge.messages.outputs import *
 from mavlink_bridge.messages.parameters import *
 from mavlink_bridge.messages.sensors import *
 from mavlink_bridge.messages.setpoints import *

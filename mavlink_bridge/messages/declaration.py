@@ -98,6 +98,15 @@ class Converter(NamedTuple):
         return EncodeError(f"{self.name}: {message} cannot be packed")
 
 
+class Definition(NamedTuple):
+    """Definition of a message that the dialect lacks: id, CRC_EXTRA, and struct and fields in wire order."""
+
+    id: int
+    crc_extra: int
+    layout: str
+    fields: tuple[str, ...]
+
+
 BY_ID: dict[int, Converter] = {}
 BY_TYPE: dict[type[Message], Converter] = {}
 
@@ -111,6 +120,7 @@ def message(
     size_v1: int | None = None,
     layout: str | None = None,
     more: tuple[str, ...] = (),
+    definition: Definition | None = None,
 ) -> Callable[[M], M]:
     """Return the decorator that declares a NamedTuple class as the values of the MAVLink message ``name``.
 
@@ -120,20 +130,25 @@ def message(
 
     ``finite`` is as in ``Converter``. ``size_v1`` is required where there are extension fields: the generated
     classes do not mark them. ``layout`` replaces the dialect's, with ``more`` extension fields that the
-    dialect lacks. Raises AttributeError for a name that the dialect lacks.
+    dialect lacks. ``definition`` is that of a message that the dialect lacks. Raises AttributeError for a
+    name that has neither.
     """
 
     def declare(kind: M) -> M:
-        number: int = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
-        generated = mavlink.mavlink_map[number]
-        codes = _codes(layout or generated.unpacker.format)
+        if definition is None:
+            number: int = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
+            generated = mavlink.mavlink_map[number]
+            crc, fields = generated.crc_extra, tuple(generated.ordered_fieldnames)
+            codes = _codes(layout or generated.unpacker.format)
+        else:
+            number, crc, codes, fields = *definition[:2], _codes(definition.layout), definition.fields
         struct = Struct("<" + "".join(codes))
-        names = zip((*generated.ordered_fieldnames, *more), codes, strict=True)
+        names = zip((*fields, *more), codes, strict=True)
         converter = Converter(
             kind,
             number,
-            generated.msgname,
-            bytes((generated.crc_extra,)),
+            name,
+            bytes((crc,)),
             struct,
             struct.size if size_v1 is None else size_v1,
             tuple(field for field, code in names for _ in _CODE.findall(code)),

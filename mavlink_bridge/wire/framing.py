@@ -21,6 +21,8 @@ from typing import NamedTuple
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as mavlink
 
+from mavlink_bridge.messages import BY_ID
+
 _MARKERS = (mavlink.PROTOCOL_MARKER_V1, mavlink.PROTOCOL_MARKER_V2)
 MAX_CACHED_BYTES = 512
 """Length of the longest datagram whose frames are cached."""
@@ -34,7 +36,9 @@ _HEADER_V2 = Struct("<7BHB")
 _CHECKED_HEADER_V2 = Struct("<6BHB")
 """The header of version 2 without the start byte: the part that the checksum covers."""
 CRC_EXTRA: dict[int, bytes] = {
-    number: bytes((kind.crc_extra,)) for number, kind in mavlink.mavlink_map.items()
+    **{number: bytes((kind.crc_extra,)) for number, kind in mavlink.mavlink_map.items()},
+    # The dialect lacks messages that are declared here.
+    **{number: row.crc_extra for number, row in BY_ID.items()},
 }
 """CRC_EXTRA by message id.
 

@@ -74,6 +74,11 @@ class Commander:
         self._config = config
         self._disarm_delay = round(config.disarm_delay * 1e6)
 
+    @property
+    def chosen_mode(self) -> Mode:
+        """Mode that was chosen last."""
+        return self._chosen_mode
+
     def status(self, now: int) -> Status:
         """Return the inputs of decisions at ``now`` (µs)."""
         stream = self._steering.stream

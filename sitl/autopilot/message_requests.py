@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from mavlink_bridge.messages import LONGEST_INTERVAL, Message, MessageInterval, RequestDataStream, Source
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.firmware import CommandRefusal, Firmware
+from sitl.autopilot.firmware.mode_list import available_modes
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.streams import members
 
@@ -88,10 +89,22 @@ class Requests:
         return None
 
     def _request(self, order: Order) -> CommandRefusal | None:
-        message_id = order.params[0]
+        message_id, which = order.params[:2]
+        if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
+            return self._list_modes(which)
+        if math.isfinite(message_id) and self._telemetry.silent(int(message_id)):
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Request refused: no data for {message_id:.0f}")
         if math.isfinite(message_id) and self._telemetry.request(int(message_id)):
             return None
         return CommandRefusal(mavlink.MAV_RESULT_UNSUPPORTED, f"Request refused: no message {message_id:.0f}")
+
+    def _list_modes(self, which: float) -> CommandRefusal | None:
+        """Send AVAILABLE_MODES (435) of the index ``which``, or of all modes for 0."""
+        modes = available_modes(self._source, self._flavour)
+        if which not in range(len(modes) + 1):
+            return CommandRefusal(mavlink.MAV_RESULT_DENIED, f"Request refused: no mode {which:.0f}")
+        self._outbox += modes if which == 0 else [modes[int(which) - 1]]
+        return None
 
     def _always(self, message_id: int) -> Callable[[Order], CommandRefusal | None]:
         def obey(_order: Order) -> CommandRefusal | None:

@@ -79,6 +79,9 @@ class Reception:
             case FollowTarget() | GlobalPosition():
                 if self._commander.follows and message.source.system != self._source.system:
                     self._following.receive(message, estimate.pose, now)
+            case Timesync(tc1=0) if message.source.component == self._source.component:
+                # Other autopilots on a shared link ask at 10 Hz; each would answer each of them.
+                pass
             case Timesync(tc1=0):
                 # Zero would make the reply a request.
                 self._outbox.append(Timesync(self._source, max(1, self._stamp(now) * 1000), message.ts1))

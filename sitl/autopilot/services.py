@@ -5,13 +5,12 @@ The module maps messages and commands to their handlers.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import (
-    FileTransfer,
     Message,
     ParamRequestList,
     ParamRequestRead,
@@ -21,7 +20,6 @@ from mavlink_bridge.messages import (
     SetHomePosition,
     Source,
 )
-from sitl.autopilot import files
 from sitl.autopilot.command_protocol import Handler, Order
 from sitl.autopilot.failures import Failures
 from sitl.autopilot.firmware import CommandRefusal, Firmware
@@ -33,6 +31,22 @@ from sitl.autopilot.parameters.protocol import ParameterProtocol
 from sitl.autopilot.parameters.values import Values
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
+
+
+class Part(Protocol):
+    """Protocol with work of its own: ``next_due`` (µs) is when it is due."""
+
+    next_due: int
+
+    def work(self, now: int, /) -> None:
+        """Do the work due at ``now`` (µs)."""
+        ...
+
+
+class Protocols(Part, Protocol):
+    """Part with ``handlers`` by type of message."""
+
+    handlers: dict[type[Any], Callable[[Any, int], None]]
 
 
 class Services:
@@ -53,28 +67,27 @@ class Services:
         outbox: list[Message],
         status_text: StatusReporter,
         configure: Callable[[], None],
+        parts: Sequence[Protocols],
     ) -> None:
-        """``configure`` is called when a parameter has changed."""
-        self._source = source
+        """``configure`` is called when a parameter has changed; ``parts`` are further protocols."""
         self._values = values
-        self._outbox = outbox
         self._configure = configure
         self._requests = Requests(source, flavour, telemetry, outbox)
         self._rates = dict.fromkeys(STREAMS, 0.0) if flavour.groups_streams else {}
         self._now = 0
-        self._missions = missions
         self.parameters = ParameterProtocol(
             source, values, outbox, status_text, self._changed, bytewise=flavour.bytewise
         )
+        self._parts: tuple[Part, ...] = (self.parameters, missions.transfer, *parts)
         self.handlers: dict[type[Any], Callable[[Any, int], None]] = {
             ParamRequestList: self.parameters.handle,
             ParamRequestRead: self.parameters.handle,
             ParamSet: self._set_parameter,
             RequestDataStream: self._requests.stream,
-            FileTransfer: self._refuse_file,
             SetHomePosition: home_commands.set_home,
             SetGpsGlobalOrigin: home_commands.set_origin,
             **missions.handlers,
+            **{kind: handle for part in parts for kind, handle in part.handlers.items()},
         }
         self.commands: dict[int, Handler] = {
             **self._requests.commands,
@@ -90,11 +103,11 @@ class Services:
     @property
     def next_due(self) -> int:
         """Time before which no ``work`` is due (µs)."""
-        return min(self.parameters.next_due, self._missions.transfer.next_due)
+        return min(part.next_due for part in self._parts)
 
     def work(self, now: int) -> None:
         """Do the work due at ``now`` (µs)."""
-        for part in (self.parameters, self._missions.transfer):
+        for part in self._parts:
             if now >= part.next_due:
                 part.work(now)
 
@@ -115,11 +128,6 @@ class Services:
                 # 0 is the initial value: a reset to it restores the default rates.
                 usual = wanted == 0.0 and resets
                 self._requests.set_rate(STREAMS[group], None if usual else wanted, now)
-
-    def _refuse_file(self, message: FileTransfer, _now: int) -> None:
-        answer = files.answer(message, self._source)
-        if answer is not None:
-            self._outbox.append(answer)
 
     def _enable_fence(self, order: Order) -> CommandRefusal | None:
         """Execute ArduPilot's DO_FENCE_ENABLE: parameter 1 is FENCE_ENABLE."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from mavlink_bridge.messages import HighresImu, Message, RawImu, SimState, Vector
+from mavlink_bridge.messages import HighresImu, Message, RawImu, ScaledImu, ScaledPressure, SimState, Vector
 from sitl.telemetry.reports import Snapshot
 from sitl.values.attitudes import euler, quaternion, to_body
 
@@ -21,10 +21,25 @@ def raw_imu(s: Snapshot) -> Message:
     return RawImu(s.source, s.time, _force(s), s.estimate.body_rates, _field(s))
 
 
+def scaled_imu(s: Snapshot) -> Message:
+    """Return SCALED_IMU (26)."""
+    return ScaledImu(s.source, s.time, _force(s), s.estimate.body_rates, _field(s))
+
+
+def scaled_pressure(s: Snapshot) -> Message:
+    """Return SCALED_PRESSURE (29)."""
+    return ScaledPressure(s.source, s.time, _pressure(s)[0], _TEMPERATURE_C)
+
+
+def _pressure(s: Snapshot) -> tuple[float, float]:
+    """Return the static pressure (hPa) and its altitude (m)."""
+    altitude = s.origin.altitude - s.estimate.position[2]
+    return _SEA_LEVEL_HPA * math.exp(-altitude / _SCALE_HEIGHT_M), altitude
+
+
 def highres_imu(s: Snapshot) -> Message:
     """Return HIGHRES_IMU (105)."""
-    altitude = s.origin.altitude - s.estimate.position[2]
-    pressure = _SEA_LEVEL_HPA * math.exp(-altitude / _SCALE_HEIGHT_M)
+    pressure, altitude = _pressure(s)
     return HighresImu(
         s.source, s.time, _force(s), s.estimate.body_rates, _field(s), pressure, altitude, _TEMPERATURE_C
     )

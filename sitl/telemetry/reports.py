@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -25,6 +25,7 @@ from mavlink_bridge.messages import (
     PositionTarget,
     Source,
     SysStatus,
+    Vector,
 )
 from sitl.estimation.sensors import Estimate
 from sitl.values.home import Home
@@ -75,18 +76,29 @@ _EKF_LOST: Final[int] = mavlink.EKF_ATTITUDE | _EKF_VERTICAL | mavlink.EKF_CONST
 _HEALTHY_RATIO: Final = 0.05
 
 
+class Flight(Protocol):
+    """Times of the present or last flight (µs since boot, 0 for none), and the number of flights."""
+
+    armed_at: int
+    took_off_at: int
+    landed_at: int
+    count: int
+
+
 class Snapshot(NamedTuple):
     """Inputs of all telemetry messages.
 
     ``time`` since boot (µs); ``base_mode`` with the armed bit; ``target`` returns the set-point that is
-    followed now, or None. ``located``: the estimator has not lost its position (true before the first one);
-    ``fixed``: there is GPS; ``test_ratio``: innovation test ratio of the position; ``spread``: σ (m) of the
-    position added since the loss of GPS; ``silent``: position messages drop out. ``waking`` 0…1: progress of
-    the reported start-up of GPS and filter; ``charge`` None without a battery; ``throttle`` 0…1;
-    ``unbreached``: MAV_SYS_STATUS_GEOFENCE, or 0 if the fence is breached or not reported; ``epoch``: Unix
-    time of the boot (µs), 0 if unknown; ``version``: AUTOPILOT_VERSION; ``mission`` returns MISSION_CURRENT,
-    ``fence`` FENCE_STATUS. ``armable``: ready, and armed or without objection to arming. ``lift``: specific
-    force of the rotors, or of the ground (m/s²); ``truth``: the true state, site NED.
+    followed now, or None. ``located``: the estimator has not lost its position (true before the first
+    one); ``fixed``: there is GPS; ``test_ratio``: innovation test ratio of the position; ``spread``: σ
+    (m) of the position added since the loss of GPS; ``silent``: position messages drop out. ``waking``
+    0…1: progress of the reported start-up of GPS and filter; ``charge`` None without a battery;
+    ``throttle`` 0…1; ``unbreached``: MAV_SYS_STATUS_GEOFENCE, or 0 if the fence is breached or not
+    reported; ``epoch``: Unix time of the boot (µs), 0 if unknown; ``version``: AUTOPILOT_VERSION;
+    ``mission`` returns MISSION_CURRENT, ``fence`` FENCE_STATUS. ``armable``: ready, and armed or without
+    objection to arming. ``lift``: specific force of the rotors, or of the ground (m/s²); ``truth``: the
+    true state, site NED. ``demand`` returns the acceleration (m/s², local NED) and yaw (rad) that the
+    controller aims at, or None; ``motors`` the rotor speeds over the greatest one; ``flight``: its times.
     """
 
     source: Source
@@ -119,6 +131,9 @@ class Snapshot(NamedTuple):
     fence: Callable[[Source], FenceStatus]
     lift: Callable[[], float]
     truth: Callable[[], VehicleState]
+    demand: Callable[[], tuple[Vector, float] | None]
+    motors: Callable[[], tuple[float, ...]]
+    flight: Flight
 
 
 def heartbeat(s: Snapshot) -> Message:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -9,6 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from mavlink_bridge.messages import Message
 from sitl.config.autopilot import TelemetryRates
 from sitl.telemetry import inertial_reports as n
+from sitl.telemetry import output_reports as o
 from sitl.telemetry import reports as r
 from sitl.telemetry import status_reports as q
 from sitl.telemetry.reports import Build, Snapshot
@@ -68,6 +70,27 @@ class Telemetry:
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: _Stream(q.home, rates.home_position),
             mavlink.MAVLINK_MSG_ID_FENCE_STATUS: _Stream(q.fence_status, 0.0),
         }
+        self._streams |= {
+            mavlink.MAVLINK_MSG_ID_SCALED_IMU: _Stream(n.scaled_imu, 0.0),
+            mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: _Stream(n.scaled_pressure, 0.0),
+            mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: _Stream(o.servo_output, 0.0),
+            mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: _Stream(o.attitude_target, 0.0),
+            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _Stream(o.position_target_global, 0.0),
+            mavlink.MAVLINK_MSG_ID_RC_CHANNELS: _Stream(o.nothing, 0.0),
+        }
+        if reports_ekf:
+            self._streams[mavlink.MAVLINK_MSG_ID_POWER_STATUS] = _Stream(o.nothing, 0.0)
+        else:
+            self._streams |= {
+                mavlink.MAVLINK_MSG_ID_ODOMETRY: _Stream(o.odometry, 0.0),
+                mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: _Stream(o.actuator_outputs, 0.0),
+                mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: _Stream(o.flight_information, 0.0),
+                mavlink.MAVLINK_MSG_ID_UTM_GLOBAL_POSITION: _Stream(o.utm_global_position, 0.0),
+            }
+        # Not among the messages that a client can set: ArduPilot refuses an interval of TIMESYNC.
+        self._own = _Stream(o.timesync, 0.0)
+        if not reports_ekf:
+            self._streams[mavlink.MAVLINK_MSG_ID_TIMESYNC] = self._own
         if not reports_ekf:
             self._streams[mavlink.MAVLINK_MSG_ID_HIGHRES_IMU] = _Stream(n.highres_imu, 0.0)
             self._streams[mavlink.MAVLINK_MSG_ID_ALTITUDE] = _Stream(q.altitude, rates.altitude)
@@ -79,9 +102,25 @@ class Telemetry:
         self._requested: list[int] = []
         self.next_due = _NEVER
 
+    def add(self, message_id: int, build: Build) -> None:
+        """Add a message that is sent on request only."""
+        self._streams[message_id] = _Stream(build, 0.0)
+
+    def stream(self, rates: Mapping[int, float], timesync: float) -> None:
+        """Set the usual rates (Hz) by message id, and that of TIMESYNC (111). Call it before ``start``."""
+        for message_id, rate in rates.items():
+            if message_id in self._streams:
+                self._streams[message_id] = _Stream(self._streams[message_id].build, rate)
+        self._own.usual = self._own.interval = round(1e6 / timesync)
+
+    def silent(self, message_id: int) -> bool:
+        """Return whether the firmware has this message, but the simulation has nothing to say in it."""
+        stream = self._streams.get(message_id)
+        return stream is not None and stream.build is o.nothing
+
     def start(self, now: int) -> None:
         """Make every stream that has an interval due at ``now`` (µs), and from then on once per interval."""
-        for stream in self._streams.values():
+        for stream in (*self._streams.values(), self._own):
             stream.due = now if stream.interval else _NEVER
         self._gather()
 
@@ -137,7 +176,8 @@ class Telemetry:
         return [message for build in builds if (message := build(snapshot)) is not None]
 
     def _gather(self) -> None:
-        self._active = [stream for stream in self._streams.values() if stream.interval]
+        streams = dict.fromkeys((*self._streams.values(), self._own))
+        self._active = [stream for stream in streams if stream.interval]
         self._schedule()
 
     def _schedule(self) -> None:

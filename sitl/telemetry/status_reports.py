@@ -28,12 +28,13 @@ _LOW_AT, _CRITICAL_AT = 0.15, 0.07
 # Limit of the speed field of GPS_RAW_INT.
 _MAX_SPEED_M_S: Final = 655.0
 _NAN: Final = math.nan
-# Capabilities of both firmwares. Files, terrain and compass calibration are not supported.
+# Capabilities of both firmwares. Terrain and compass calibration are not supported.
 _CAPABILITIES: Final = (
     mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
     | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FTP
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT

@@ -47,8 +47,29 @@ _PX4: Final = TelemetryRates(
     estimator_status=1.0,
 )
 
+# As recorded, beside the messages of ``TelemetryRates``; ODOMETRY with a third of its rate.
+_FURTHER: Final[dict[str, dict[int, float]]] = {
+    "ardupilot": {},
+    "px4": {
+        mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 10.0,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: 10.0,
+        mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: 10.0,
+        mavlink.MAVLINK_MSG_ID_ODOMETRY: 10.0,
+        mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: 1.0,
+        mavlink.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
+    },
+}
+_TIMESYNC: Final = {"ardupilot": 0.1, "px4": 10.0}
+
 GROUPS: Final[dict[int, tuple[int, ...]]] = {
-    mavlink.MAV_DATA_STREAM_RAW_SENSORS: (mavlink.MAVLINK_MSG_ID_RAW_IMU,),
+    mavlink.MAV_DATA_STREAM_RAW_SENSORS: (
+        mavlink.MAVLINK_MSG_ID_RAW_IMU,
+        mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE,
+    ),
+    mavlink.MAV_DATA_STREAM_RC_CHANNELS: (
+        mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
+        mavlink.MAVLINK_MSG_ID_RC_CHANNELS,
+    ),
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
         mavlink.MAVLINK_MSG_ID_SYS_STATUS,
         mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
@@ -74,6 +95,13 @@ def usual_rates(config: AutopilotConfig) -> TelemetryRates:
     if config.streams == "quiet":
         return config.rates
     return _ARDUPILOT if config.flavour == "ardupilot" else _PX4
+
+
+def further_rates(config: AutopilotConfig) -> tuple[dict[int, float], float] | None:
+    """Return the rates (Hz) by id of what firmware streams besides, and TIMESYNC's; None in quiet flights."""
+    if config.streams == "quiet":
+        return None
+    return _FURTHER[config.flavour], _TIMESYNC[config.flavour]
 
 
 def members(stream: int) -> tuple[int, ...]:

@@ -75,6 +75,8 @@ class Rig:
         self.autopilot = Autopilot(self.config, FIREFLY, SITE, seed=1, saved=saved, signing=signing)
         self.now = 0
         self.tick = tick
+        self.most = 1
+        """Greatest number of datagrams of a step: one, but in a download."""
         self.received: list[tuple[int, Message]] = []
         self.bytes = b""
         self._codec = Codec()
@@ -86,7 +88,7 @@ class Rig:
 
     def step_bytes(self, data: bytes, link: str = LINK) -> None:
         out = self.autopilot.step(self.now, [Datagram(link, data)] if data else [])
-        assert len(out) <= 1
+        assert len(out) <= self.most
         for datagram in out:
             self.bytes += datagram.data
             self.received += [(self.now, message) for message in self._codec.feed(datagram.data)]

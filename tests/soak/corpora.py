@@ -239,6 +239,35 @@ def services() -> tuple[Message, ...]:
         m.HilState(AUTOPILOT, 7, *place, (1.0, -0.5, 0.1)),
         m.EstimatorStatus(AUTOPILOT, 7, 0.1, 0.1, 0.1, 0.1, NAN, NAN, 0.3, 0.3, 831),
         m.MissionCount(AUTOPILOT, 2, *ground, 0, 5),
+        *records(me, place, four),
+    )
+
+
+def records(
+    me: tuple[int, int], place: tuple[float, float, float], four: tuple[float, float, float, float]
+) -> tuple[Message, ...]:
+    """Requests of logs and their answers, files' metadata, and what an autopilot aims at and puts out."""
+    return (
+        m.LogRequestList(GROUND, 0, 0xFFFF, *me),
+        m.LogEntry(AUTOPILOT, 1_700_000_000, 5000, 1, 1, 1),
+        m.LogRequestData(GROUND, 0, 5000, 1, *me),
+        m.LogData(AUTOPILOT, 90, 1, bytes(range(90))),
+        m.LogErase(GROUND, *me),
+        m.LogRequestEnd(GROUND, *me),
+        m.ComponentMetadata(AUTOPILOT, 7000, 0x1234, "mftp://etc/extras/component_general.json.xz"),
+        m.AvailableMode(AUTOPILOT, 4, 0, 8, 3, 0, "GUIDED"),
+        m.CurrentMode(AUTOPILOT, 4, 4, 0),
+        m.AvailableModesMonitor(AUTOPILOT, 1),
+        m.AttitudeTarget(AUTOPILOT, 7000, four, ZERO, 0.5, 7),
+        m.PositionTargetGlobal(AUTOPILOT, 7000, *place, ZERO, ZERO, 0.5, 0.0, 0x9C0, 5),
+        m.Odometry(AUTOPILOT, 7, (1.0, 2.0, -5.0), four, ZERO, ZERO, 1, 1, 0, 8),
+        m.ServoOutput(AUTOPILOT, 7, 0, (1500,) * 6),
+        m.ActuatorOutputs(AUTOPILOT, 7, (1500.0,) * 6),
+        m.RcChannels(AUTOPILOT, 7000, (1500,) * 8, 255),
+        m.ScaledImu(AUTOPILOT, 7000, (0.0, 0.0, -9.80665), (0.0, 0.1, 0.2), (0.2, 0.0, 0.4)),
+        m.ScaledPressure(AUTOPILOT, 7000, 960.0, 25.0),
+        m.FlightInformation(AUTOPILOT, 1, 2, 1, 7000, 0),
+        m.UtmGlobalPosition(AUTOPILOT, 7, *place, 8.0, ZERO, (0.3, 0.4, 0.1), bytes(18), 3, 0x7F),
     )
 
 

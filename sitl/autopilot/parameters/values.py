@@ -42,6 +42,10 @@ class Values:
         """Return the present value of the parameter at ``number``."""
         return self._values[number]
 
+    def initial(self, number: int) -> float:
+        """Return the initial value of the parameter at ``number``."""
+        return self._initial[number]
+
     def named(self, name: str) -> float:
         """Return the present value by name; raise KeyError if it does not exist."""
         return self._values[self._numbers[name]]

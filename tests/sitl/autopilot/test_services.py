@@ -56,7 +56,7 @@ def test_versions_are_those_of_the_real_ones(flavour, version, command):
         "MISSION_INT": True,
         "COMMAND_INT": True,
         "PARAM_ENCODE_BYTEWISE": flavour == "px4",
-        "FTP": False,
+        "FTP": True,
         "MISSION_FENCE": True,
     }
     assert message.uid != 0
@@ -249,12 +249,12 @@ def ftp(opcode: int, path: bytes = b"", session: int = 0) -> bytes:
 
 @pytest.mark.parametrize(
     ("opcode", "answer", "error"),
-    [(4, 129, 10), (3, 129, 10), (15, 129, 4), (99, 129, 7), (1, 128, 0), (2, 128, 0)],
+    [(4, 129, 10), (3, 129, 10), (15, 129, 4), (6, 129, 9), (99, 129, 7), (1, 128, 0), (2, 128, 0)],
 )
-def test_files_are_refused_at_once(opcode, answer, error):
+def test_what_is_not_there_is_refused_at_once(opcode, answer, error):
     client = up("ardupilot")
     found = client.send(
-        dialect.MAVLink_file_transfer_protocol_message(0, 11, 1, ftp(opcode, b"@PARAM/param.pck"))
+        dialect.MAVLink_file_transfer_protocol_message(0, 11, 1, ftp(opcode, b"absent/param.pck"))
     )
     reply = only(found, "FILE_TRANSFER_PROTOCOL")
     assert (reply.target_system, reply.target_component) == (255, 190)
