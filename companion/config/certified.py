@@ -33,6 +33,23 @@ class DeadlockConfig(Settings):
     pushed: float = Field(0.2, ge=0.0, lt=1.0, description="share of the pull from which it counts as pushed")
 
 
+class AnticipationConfig(Settings):
+    """Turn of the goal to the side because of encounters that are predicted."""
+
+    most: float = Field(0.0, ge=0.0, le=1.5, description="rad, the largest turn; 0 switches it off")
+    look: Positive = Field(3.0, description="s, the latest encounter that counts")
+    wide: float = Field(1.3, ge=1.0, le=5.0, description="distance wanted, in least distances of plans")
+    share: float = Field(
+        0.6, gt=0.0, le=1.0, description="part of the missing distance that each makes room for"
+    )
+    wrong_side: float = Field(
+        0.5,
+        ge=0.0,
+        le=1.0,
+        description="wanted distances on the side of the turn beyond which another passes there",
+    )
+
+
 class FollowingConfig(Settings):
     """Cost of a plan whose destination moves; all other weights are those of a destination at rest."""
 
@@ -146,6 +163,7 @@ class CertifiedConfig(Settings):
     spare: Positive = Field(0.01, description="m wanted beyond the least distance, for rounding")
     following: FollowingConfig = FollowingConfig()
     deadlock: DeadlockConfig = DeadlockConfig()
+    anticipation: AnticipationConfig = AnticipationConfig()
 
     @property
     def knots(self) -> int:

@@ -225,6 +225,11 @@ class Agreements:
                     found[system] = end
         return found
 
+    def newest(self) -> list[StoredPlan]:
+        """Return the newest plan of each peer that has not said farewell, by system id."""
+        found = [peer.plans.newest for _, peer in sorted(self._peers.items()) if peer.left is None]
+        return [plan for plan in found if plan is not None]
+
     @property
     def columns(self) -> frozenset[int]:
         """Systems whose newest plan is a column, without those that said farewell: they make no other."""

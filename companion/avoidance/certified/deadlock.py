@@ -57,18 +57,20 @@ class DeadlockTurn:
         self._best = np.inf
         self._waited = 0.0
 
-    def turned(self, position: Array, goal: Array) -> Array:
+    def turned(self, position: Array, goal: Array, least: float = 0.0) -> Array:
         """Return the place (3,), m, to aim for from ``position`` (3,) instead of ``goal`` (3,).
 
-        On a turn above ``bend`` it is at most ``detour`` (m) away.
+        The goal is turned by ``least`` (rad) at least. On a turn above ``bend`` it is at most ``detour`` (m)
+        away.
         """
-        if self.angle == 0.0:
+        angle = max(self.angle, least)
+        if angle == 0.0:
             return goal
         offset = goal - position
         length = sqrt(offset @ offset)
-        if self.angle > self._config.bend and length > self._config.detour:
+        if angle > self._config.bend and length > self._config.detour:
             offset = offset * (self._config.detour / length)
-        return position + turned(offset, -self._sense * self.angle)
+        return position + turned(offset, -self._sense * angle)
 
     @property
     def stalled(self) -> bool:

@@ -7,6 +7,7 @@ from math import hypot
 import numpy as np
 
 from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.anticipation import anticipated_turn
 from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.commitment import Commitment, HoldReason
@@ -44,7 +45,8 @@ class CertifiedFlight:
         program = SeparationQp(
             steps, config.limits.within(config.field.margin(1)), certified, planar=config.planar
         )
-        self._deadlock_turn = DeadlockTurn(certified.deadlock, _TURNING_SENSES.get(config.turning_sense, 1.0))
+        self._sense = _TURNING_SENSES.get(config.turning_sense, 1.0)
+        self._deadlock_turn = DeadlockTurn(certified.deadlock, self._sense)
         self.commitment = Commitment(
             certified, program, self._deadlock_turn, fleet.fingerprint, planar=config.planar
         )
@@ -276,7 +278,9 @@ class CertifiedFlight:
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
         subgoal = self._subgoal(now, epoch, own[-1, 2], aim.destination)
-        goal = self._deadlock_turn.turned(start.position_m, subgoal.place)
+        anticipates = self._config.certified.anticipation.most > 0.0 and aim.path is None
+        turn = self._anticipated(epoch, own, subgoal.place) if anticipates else 0.0
+        goal = self._deadlock_turn.turned(start.position_m, subgoal.place, turn)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 
@@ -294,6 +298,25 @@ class CertifiedFlight:
         if self._detour.begun != begun:
             self._deadlock_turn.restart()
         return subgoal
+
+    def _anticipated(self, epoch: int, own: Array, goal: Array) -> float:
+        """Return the turn (rad) of ``goal`` (3,), m, for encounters with the peers' newest plans.
+
+        ``own`` (n, 3, 3), m: the committed control points from the epoch after ``epoch`` (µs) on. The other
+        plans are moved to its beginning, by their average velocities.
+        """
+        certified = self._config.certified
+        seconds, begins = float(self._seconds[-1]), epoch + certified.epoch_us
+        known = self.agreements.newest()
+        if not known:
+            return 0.0
+        others = np.array([[plan.controls[0, 0], plan.controls[-1, 2]] for plan in known])
+        ages = 1e-6 * np.array([begins - plan.plan.epoch for plan in known])
+        others += (others[:, 1:] - others[:, :1]) * (ages / seconds)[:, None, None]
+        ends, wanted = np.stack([own[0, 0], own[-1, 2]]), self._sources.between
+        return anticipated_turn(
+            certified.anticipation, wanted, ends, others, goal, seconds, sense=self._sense
+        )
 
     def _objective(self, begins: float, aim: Aim, goal: Array, field: Array) -> Objective:
         """Return the preferred places of a plan that begins in ``begins`` s and should end at ``goal`` (3,).
