@@ -107,7 +107,7 @@ class ServoOutput(NamedTuple):
         return ServoOutput(source, fields[0], fields[9], fields[1:9] + fields[10:])
 
     def encode(self) -> Fields:
-        outputs = self.outputs + (0,) * (_CHANNELS - len(self.outputs))
+        outputs = self.outputs[:_CHANNELS] + (0,) * (_CHANNELS - len(self.outputs))
         return self.time & 0xFFFFFFFF, *outputs[:8], self.port, *outputs[8:]
 
 
@@ -124,8 +124,8 @@ class ActuatorOutputs(NamedTuple):
         return ActuatorOutputs(source, fields[0], fields[2 : 2 + fields[1].bit_length()])
 
     def encode(self) -> Fields:
-        count = len(self.outputs)
-        return self.time, (1 << count) - 1, *self.outputs, *(0.0,) * (_ACTUATORS - count)
+        count = min(len(self.outputs), _ACTUATORS)
+        return self.time, (1 << count) - 1, *self.outputs[:count], *(0.0,) * (_ACTUATORS - count)
 
 
 @message("RC_CHANNELS")
@@ -188,14 +188,15 @@ class ScaledPressure(NamedTuple):
 
 @message("FLIGHT_INFORMATION", size_v1=28)
 class FlightInformation(NamedTuple):
-    """FLIGHT_INFORMATION (264): times of arming and take-off (Unix, µs; 0 for none), number of the flight.
+    """FLIGHT_INFORMATION (264): times of arming, take-off and landing, and the number of the flight.
 
-    ``landed`` is the time of the landing (µs since boot; 0 in flight and before).
+    Times are in µs since boot, 0 for none; MAVLink names the first two UTC by mistake. ``landed`` is 0 in
+    flight and before.
     """
 
     source: Source
-    armed_utc: int
-    took_off_utc: int
+    armed: int
+    took_off: int
     flight: int
     time_boot: int
     landed: int

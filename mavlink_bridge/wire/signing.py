@@ -133,7 +133,8 @@ class Signing:
             return Refusal.OLD
         if not hmac.compare_digest(key.signature(data[:-6]), data[-6:]):
             return Refusal.FORGED
-        if self._clock and stamp > self._clock + LEAD:
+        # Stamps from before a restart prove that it is later than a clock that was not set says.
+        if self._clock and stamp > max(self._clock, self._floor) + LEAD:
             return Refusal.AHEAD
         # Stored only after the signature is verified. Otherwise a forged stamp in the future would block the
         # true sender until that time.

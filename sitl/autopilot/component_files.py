@@ -33,7 +33,7 @@ class ComponentFiles:
     """Files by path; a path may carry a query (``?start=0&count=10&withdefaults=1``)."""
 
     def __init__(
-        self, values: Values, *, metadata: bool, logs: Callable[[], Mapping[str, Callable[[], bytes]]]
+        self, values: Values, *, metadata: bool, logs: Callable[[], Mapping[str, bytearray]]
     ) -> None:
         """``metadata``: whether there is component metadata. ``logs`` returns the logs by path."""
         self._values = values
@@ -55,12 +55,12 @@ class ComponentFiles:
         if name in self._metadata:
             return self._metadata[name]
         log = self._logs().get(name)
-        return None if log is None else log()
+        return None if log is None else bytes(log)
 
     def directory(self, path: str) -> list[str] | None:
         """Return the entries of a directory as in MAVLink FTP (D name, F name TAB size), or None."""
         sizes = {name: len(data) for name, data in self._metadata.items()}
-        sizes |= {name: len(log()) for name, log in self._logs().items()}
+        sizes |= {name: len(log) for name, log in self._logs().items()}
         sizes[_PACKED] = len(self._packed(""))
         head = f"{path}/" if path else ""
         below = {name[len(head) :]: size for name, size in sizes.items() if name.startswith(head)}

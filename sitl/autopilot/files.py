@@ -120,11 +120,11 @@ class FileServer:
             case mavlink.MAV_FTP_OPCODE_NONE:
                 answer = b""
             case mavlink.MAV_FTP_OPCODE_TERMINATESESSION:
-                self._sessions.pop((client, number), None)
+                self._close(client, number)
                 answer = b""
             case mavlink.MAV_FTP_OPCODE_RESETSESSION:
                 for key in [key for key in self._sessions if key[0] == client]:
-                    del self._sessions[key]
+                    self._close(*key)
                 answer = b""
             case mavlink.MAV_FTP_OPCODE_LISTDIRECTORY:
                 answer = self._listed(request)
@@ -151,14 +151,15 @@ class FileServer:
         mine = {number: session for (of, number), session in self._sessions.items() if of == client}
         for number, session in mine.items():
             # The answer was lost, and the client repeats its request.
-            if self._chooses and session.opening == opening:
+            if self._chooses and session.opening == opening and now - session.used < _IDLE_US:
+                session.used = now
                 return number, _SIZE.pack(len(session.contents))
         contents = self._contents(request)
         number = request.session
         if self._chooses:
             number = min(set(range(len(mine) + 1)) - set(mine))
-        if (client, number) not in self._sessions:
-            self._make_room(now)
+        self._close(client, number)
+        self._make_room(now)
         self._sessions[client, number] = _Session(opening, contents, now)
         return number, _SIZE.pack(len(contents))
 
@@ -168,7 +169,12 @@ class FileServer:
         oldest = min(self._sessions, key=lambda key: self._sessions[key].used)
         if now - self._sessions[oldest].used < _IDLE_US:
             raise _Refused(mavlink.MAV_FTP_ERR_NOSESSIONSAVAILABLE)
-        del self._sessions[oldest]
+        self._close(*oldest)
+
+    def _close(self, client: Source, number: int) -> None:
+        """Close the session, if it is open, and end its burst."""
+        self._sessions.pop((client, number), None)
+        self._bursts = [burst for burst in self._bursts if burst[:2] != (client, number)]
 
     def _session(self, client: Source, number: int, now: int) -> _Session:
         session = self._sessions.get((client, number))

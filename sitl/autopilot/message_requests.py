@@ -72,6 +72,10 @@ class Requests:
             return CommandRefusal(
                 mavlink.MAV_RESULT_FAILED, f"Interval refused: {interval:.0f} us is too short"
             )
+        if self._telemetry.silent(int(message_id)):
+            return CommandRefusal(
+                mavlink.MAV_RESULT_DENIED, f"Interval refused: no data for {message_id:.0f}"
+            )
         if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not 0.0 <= interval <= _SLOWEST_HEARTBEAT_US:
             # All clients hear the same HEARTBEAT, and take the vehicle for lost without it.
             return CommandRefusal(mavlink.MAV_RESULT_DENIED, "Interval refused: HEARTBEAT stays on")

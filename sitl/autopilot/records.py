@@ -115,12 +115,11 @@ class Records:
             for number, parameter in enumerate(values.table)
         )
 
-    def _logs(self) -> Mapping[str, Callable[[], bytes]]:
+    def _logs(self) -> Mapping[str, bytearray]:
         """Return the logs by path: numbered in ArduPilot's folder, sessions in PX4's, and none elsewhere."""
         folder, extension = _FOLDERS[self._px4], self._recorder.extension
         if self._px4:
             return {
-                f"{folder}/sess{log.number:03}/log001.{extension}": log.contents
-                for log in self._recorder.logs
+                f"{folder}/sess{log.number:03}/log001.{extension}": log.data for log in self._recorder.logs
             }
-        return {f"{folder}/{log.number:08}.{extension}": log.contents for log in self._recorder.logs}
+        return {f"{folder}/{log.number:08}.{extension}": log.data for log in self._recorder.logs}

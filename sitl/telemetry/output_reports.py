@@ -123,8 +123,9 @@ def timesync(s: Snapshot) -> Message:
 def flight_information(s: Snapshot) -> Message:
     """Return FLIGHT_INFORMATION (264)."""
     flight = s.flight
-    utc = [s.epoch + then if s.epoch and then else 0 for then in (flight.armed_at, flight.took_off_at)]
-    return FlightInformation(s.source, utc[0], utc[1], flight.count, s.time, flight.landed_at)
+    return FlightInformation(
+        s.source, flight.armed_at, flight.took_off_at, flight.count, s.time, flight.landed_at
+    )
 
 
 def utm_global_position(s: Snapshot) -> Message | None:

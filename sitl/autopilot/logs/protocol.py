@@ -45,7 +45,7 @@ class LogProtocol:
         self._source, self._outbox, self._recorder = source, outbox, recorder
         self._reporter, self._armed = reporter, armed
         self._first, self._refuses_armed = first, refuses_armed
-        self._downloads: dict[Source, tuple[bytes, int, int, int]] = {}
+        self._downloads: dict[Source, tuple[bytearray, int, int, int]] = {}
         self.next_due = _NEVER
         self.handlers: dict[type[Any], Callable[[Any, int], None]] = {
             LogRequestList: self._list,
@@ -60,7 +60,7 @@ class LogProtocol:
         self._downloads = {}
         for client, (contents, number, offset, end) in going.items():
             for _ in range(_BURST):
-                data = contents[offset : min(offset + _LENGTH, end)]
+                data = bytes(contents[offset : min(offset + _LENGTH, end)])
                 self._outbox.append(LogData(self._source, offset, number, data))
                 offset += len(data)
                 if len(data) < _LENGTH or offset >= end:
@@ -91,9 +91,9 @@ class LogProtocol:
         if message.source not in self._downloads and len(self._downloads) >= _MOST_DOWNLOADS:
             self._reporter.complain("Log download in progress", now)
             return
-        contents = log.contents()
-        end = min(message.offset + message.length, len(contents))
-        self._downloads[message.source] = contents, message.id, min(message.offset, 0xFFFFFFFF), end
+        # Records are only appended: what is there now stays, and a request copies nothing.
+        end = min(message.offset + message.length, len(log.data))
+        self._downloads[message.source] = log.data, message.id, min(message.offset, 0xFFFFFFFF), end
         self.next_due = min(self.next_due, now)
 
     def _erase(self, _message: LogErase, now: int) -> None:

@@ -23,10 +23,6 @@ class Log:
         self.data = bytearray()
         self.ended_utc = 0
 
-    def contents(self) -> bytes:
-        """Return the bytes recorded so far."""
-        return bytes(self.data)
-
 
 class Recorder:
     """Recorder of one vehicle. ``logs`` is in order of time; the oldest are dropped after eight."""
@@ -63,13 +59,14 @@ class Recorder:
         log = self._open
         if log is None:
             return
-        if custom_mode != self._mode:
+        room = len(log.data) < _MOST_BYTES
+        if custom_mode != self._mode and room:
             self._mode = custom_mode
             log.data += self._encoder.mode(now, custom_mode)
         if not armed:
             log.data += self._encoder.armed(now, armed=False)
             self._open = None
-        elif now >= self._due and len(log.data) < _MOST_BYTES:
+        elif now >= self._due and room:
             self._due = now + _PERIOD_US
             log.data += self._encoder.moment(self._moment(now))
         epoch = self._epoch()

@@ -286,3 +286,12 @@ def test_the_same_key_once_more_makes_nothing_count_again() -> None:
 def test_nothing_is_signed_without_a_key() -> None:
     with pytest.raises(ValueError, match="no key"):
         Signing().sign(b"", 0)
+
+
+def test_a_clock_that_was_not_set_locks_out_nobody_after_a_restart() -> None:
+    """The stored stamp proves that it is later than the clock says."""
+    mine = Signing(KEY)
+    mine.resume(STAMP)
+    mine.present(NOW - 2 * 10 * LEAD)
+    assert mine.check(frame_of(signed(STAMP + LEAD))) is None
+    assert mine.check(frame_of(signed(STAMP + LEAD + 1))) is Refusal.AHEAD

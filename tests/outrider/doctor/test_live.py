@@ -334,7 +334,7 @@ def test_a_signed_vehicle() -> None:
     assert "frames arrive, and none counts: signed with another key" in said
 
 
-@pytest.mark.parametrize(("baud", "severity"), [(38_400, Severity.WARNING), (57_600, Severity.OK)])
+@pytest.mark.parametrize(("baud", "severity"), [(38_400, Severity.WARNING), (115_200, Severity.OK)])
 def test_the_room_on_a_serial_port(baud: int, severity: Severity) -> None:
     bench = Bench(autopilot("px4"))
     bench.run(3.0)

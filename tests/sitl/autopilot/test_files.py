@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import all as dialect
 
 from mavlink_bridge.messages import ComponentMetadata, ParamValue
 from tests.sitl.autopilot_rig import FLAVOURS, REQUEST, Rig
-from tests.sitl.ftp_client import ACK, CRC, NAK, OPEN, READ, RESET, Ftp, answers
+from tests.sitl.ftp_client import ACK, BURST, CRC, NAK, OPEN, READ, RESET, TERMINATE, Ftp, answers
 from tests.sitl.outside_client import Client
 
 LAYOUTS = {1: "<b", 2: "<h", 3: "<i", 4: "<f"}
@@ -119,6 +119,15 @@ def test_a_full_table_of_sessions_is_refused_until_one_has_been_idle():
     assert (refused.said, refused.data) == (NAK, b"\x05")
     ftp.client.wait(3.1)
     assert ftp.open("@PARAM/param.pck")[1] > 0
+
+
+def test_a_burst_ends_with_its_session():
+    ftp = up("px4")
+    number, _ = ftp.open("@PARAM/param.pck")
+    assert answers(ftp.client.send(ftp.request(BURST, b"", number, 0, 1)))
+    assert ftp.ask(TERMINATE, session=number).said == ACK
+    assert ftp.open("@PARAM/param.pck")[0] == number
+    assert answers(ftp.client.wait(0.1)) == []
 
 
 @settings(max_examples=200, deadline=None)

@@ -68,7 +68,7 @@ class Log:
         Afterwards ``loss`` holds what else was left out.
         """
         reader = read_tlog(self.path)
-        self.done = late = 0
+        self.done = late = unknown = 0
         for record in reader:
             self.done += 8 + len(record.frame)
             if record.time > LATEST:
@@ -79,12 +79,16 @@ class Log:
                 raise LogError(f"{self.path}: the reader handed out what is no frame")
             if frame.message_id == mavlink.MAVLINK_MSG_ID_SETUP_SIGNING:
                 continue
+            if frame.message_id not in mavlink.mavlink_map:
+                # The bridge has it, but the dialect lacks its fields.
+                unknown += 1
+                continue
             known = kind(frame.message_id)
             yield LogMessage(
                 record.time, record.link, frame.system, frame.component, known, known.whole(frame.payload)
             )
         report = reader.report
-        self.loss = Loss(report.bad + report.truncated + late, report.unknown)
+        self.loss = Loss(report.bad + report.truncated + late, report.unknown + unknown)
 
 
 def watched(

@@ -7,6 +7,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from mavlink_bridge.messages import BY_ID
 from outrider.logs.census import Vehicle
 
 MILLION: Final = 1_000_000
@@ -15,7 +16,13 @@ MILLION: Final = 1_000_000
 
 def rates(vehicle: Vehicle) -> Mapping[str, float]:
     """Return the messages per second by name, the most frequent first."""
-    return {mavlink.mavlink_map[number].msgname: vehicle.rate(many) for number, many in vehicle.counts}
+    return {_message(number): vehicle.rate(many) for number, many in vehicle.counts}
+
+
+def _message(number: int) -> str:
+    """Return the name of a message of the dialect, or of one that it lacks and the bridge has."""
+    known = mavlink.mavlink_map.get(number)
+    return BY_ID[number].name if known is None else str(known.msgname)
 
 
 def enumerated(enumeration: str, number: int | None) -> str | None:
