@@ -179,11 +179,10 @@ class FollowTarget(NamedTuple):
     def decode(source: Source, fields: Fields) -> FollowTarget | None:
         time, _, latitude, longitude, altitude, vx, vy, vz = fields[:8]
         # Covariances and similar fields are not used, and may hold any value.
-        if not (
-            on_globe(latitude, longitude) and fields[-1] & HAS_POSITION and isfinite(altitude + vx + vy + vz)
-        ):
+        if not (on_globe(latitude, longitude) and fields[-1] & HAS_POSITION and isfinite(altitude)):
             return None
-        velocity = (vx, vy, vz) if fields[-1] & HAS_VELOCITY else None
+        # A sender that does not know its velocity, such as MAVSDK, says NaN.
+        velocity = (vx, vy, vz) if fields[-1] & HAS_VELOCITY and isfinite(vx + vy + vz) else None
         return FollowTarget(source, time * 1000, latitude / 1e7, longitude / 1e7, altitude, velocity)
 
     def encode(self) -> Fields:

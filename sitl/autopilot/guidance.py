@@ -136,12 +136,17 @@ class Guidance:
         x, y, _ = self._shaper.position
         self._begin(Activity.TAKEOFF, Setpoint((POSITION, POSITION, POSITION), (x, y, -height)))
 
-    def go(self, position: Vector, speed: float, yaw: float | None, here: Pose) -> None:
-        """Fly to ``position`` (m) at up to ``speed`` (m/s), facing ``yaw`` (rad; None keeps the yaw)."""
+    def go(
+        self, position: Vector, speed: float, yaw: float | None, here: Pose, through: Vector = ZERO
+    ) -> None:
+        """Fly to ``position`` (m) at up to ``speed`` (m/s), facing ``yaw`` (rad; None keeps the yaw).
+
+        ``through`` is the velocity (m/s) there; unless zero, the next destination has to follow in time.
+        """
         self._leave_ground(here)
         gentle = self._config.gentle_acceleration, self._config.max_jerk
         self._limits[Activity.GO] = Limits(speed, *gentle)
-        self._begin(Activity.GO, Setpoint((POSITION, POSITION, POSITION), position, yaw=yaw))
+        self._begin(Activity.GO, Setpoint((POSITION, POSITION, POSITION), position, through, yaw=yaw))
 
     def track(self, setpoint: Setpoint, received: int, timeout: int | None, here: Pose, now: int) -> None:
         """Follow ``setpoint``, valid at the time ``received`` (µs), for ``timeout`` µs (None: no limit)."""

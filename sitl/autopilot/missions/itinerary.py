@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import Vector
 from sitl.autopilot.guidance import Activity, Guidance
+from sitl.autopilot.missions.corners import passing
 from sitl.autopilot.missions.items import (
     FLOWN,
     PAUSING,
@@ -227,7 +228,8 @@ class Itinerary:
             case _:
                 self._target = self._place(item, here)
                 speed, yaw = self._leg_speed(here), self._yaw(item, here)
-                self._guidance.go(self._target, speed, yaw, here.pose)
+                through = passing(here.position, self._target, self._next_place(here), speed, self._config)
+                self._guidance.go(self._target, speed, yaw, here.pose, through)
         self.phase = Phase.GOING
         return None
 
@@ -287,6 +289,14 @@ class Itinerary:
         height = self._height(item)
         x, y, z = self._origin.local(item.x / 1e7, item.y / 1e7, self._origin.altitude + height)
         return x, y, z
+
+    def _next_place(self, here: Estimate) -> Vector | None:
+        """Return the next waypoint's place if the present one is flown through, else None."""
+        follows = self._items[self.current : self.current + 2]
+        item = follows[0]
+        if any(one.command != mavlink.MAV_CMD_NAV_WAYPOINT or one.here for one in follows):
+            return None
+        return self._place(follows[1], here) if len(follows) == 2 and not item.params[0] > 0.0 else None
 
     def _leg_speed(self, here: Estimate) -> float:
         """Return the speed (m/s) along the leg, within the limits of climb and sink rate."""

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import all as dialect
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import Attitude, CommandAck, CommandInt, FollowTarget, GlobalPosition, Source
+from mavlink_bridge.wire.codec import Codec
 from sitl.autopilot.firmware import Mode
 from tests.sitl.autopilot_rig import FLAVOURS, PILOT, SET_MODE, SITE, VELOCITY_YAW, Rig, setpoint
 from tests.sitl.mission_client import at, upload
@@ -213,6 +214,16 @@ def leader(t, *, speed, kind):
     return GlobalPosition(
         LEADER, round(t * 1e6), latitude, longitude, SITE.altitude + 4.0, 4.0, velocity, 0.0
     )
+
+
+def test_a_leader_that_does_not_know_its_velocity_is_followed():
+    nan = [math.nan] * 3
+    message = dialect.MAVLink_follow_target_message(
+        0, 3, 10, 20, 30.0, nan, [0] * 3, [1, 0, 0, 0], [0] * 3, [0] * 3, 0
+    )
+    (received,) = Codec().feed(message.pack(dialect.MAVLink(None, srcSystem=1)))
+    assert received.velocity is None
+    assert received.altitude == 30.0
 
 
 def follow(rig, seconds, kind=FollowTarget, speed=3.0):
