@@ -1,8 +1,9 @@
 """ArduPilot/ardupilot, Tools/autotest/arducopter.py (and vehicle_test_suite.py, which it uses).
 
-Compared with the source: CONDITION_YAW's angles, the modes without arming, and the names
+Compared with the source: the modes without arming, and the names
 DO_CHANGE_SPEED_in_guided, MAV_CMD_DO_FLIGHTTERMINATION and MAV_CMD_MISSION_START_p1_p2. The other names are
-given from knowledge of the suite, and the figures of those tests are this project's.
+given from knowledge of the suite and not compared, and the figures of those tests are this project's. The
+angles of CONDITION_YAW are those of the suite's test of another kind of vehicle.
 """
 
 from __future__ import annotations
