@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from numbers import Real
 from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -25,8 +26,9 @@ Bound = Annotated[float, Field(gt=0.0, le=100.0)]
 
 def _of_each_axis(value: object) -> object:
     """Return three times a number, a list as a tuple, and everything else as it is."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return value, value, value
+    if isinstance(value, Real) and not isinstance(value, bool):
+        number = float(value)
+        return number, number, number
     # A strict model takes no list from a function, although it takes one from JSON.
     return tuple(value) if isinstance(value, list) else value
 

@@ -37,6 +37,7 @@ class Unheard:
         self._most = max(guard.neighbour_lost_us - self._after, 0)
         self._growth = guard.unheard_speed
         self._d_min = field.d_min + field.margin(2)
+        self._scale = np.array([1.0, 1.0, 1.0 / field.downwash])
         self._braking = min(config.limits.u_max)
         self._horizon_s = 1e-6 * config.horizon.dt_us * (config.horizon.steps + 1)
         # The longest silence (µs) of each neighbour, as far as it is remembered, at the last call.
@@ -58,9 +59,11 @@ class Unheard:
         silences = self._silence(now, ages)
         unheard = silences > self._after
         size = float(np.sqrt(towards @ towards))
+        towards = towards * self._scale
         if size < _LEVEL or not unheard.any():
             return inf
-        off = here[unheard] - place
+        # Distances, and the speed of approach, in the ellipsoid of ``field.downwash``.
+        off = (here[unheard] - place) * self._scale
         distance = np.maximum(norms(off), _LEVEL)
         closing = off @ towards / (size * distance)
         ahead = closing > 0.0
@@ -85,7 +88,7 @@ class Unheard:
         unheard = silences > self._after
         if not unheard.any():
             return False
-        off = here[unheard] - place
+        off = (here[unheard] - place) * self._scale
         gap = norms(off) - self._d_min - self.radii(silences[unheard])
         return bool((gap < self._horizon_s * (speed + self._growth)).any())
 

@@ -57,6 +57,7 @@ class NonCooperative:
             one.system: (exact + one.radius, isinstance(one, MovingPost)) for one in config.moving
         }
         self._target = None if config.target_d_min is None else config.target_d_min + away
+        self._heights = 1.0 / config.field.downwash
         self._seconds: Array = 1e-6 * own.dt_us * np.arange(steps + 1.0)
 
     def seen(self, begins: int, members: Set[int], world: World) -> list[NonCooperativeVehicle]:
@@ -90,7 +91,7 @@ class NonCooperative:
             radii = reach + one.least
             if one.upright:
                 centres[..., 2] = own[..., 2]
-            _stop_before_own_plan(centres, own, radii)
+            _stop_before_own_plan(centres, own, radii, self._heights)
             if one.upright:
                 centres[..., 2] = own[..., 2]
             found.append((centres, radii))
@@ -132,22 +133,27 @@ class NonCooperative:
                 if one.upright:
                     place[:, 2] = knots[:, 2]
             enough = np.array([one.least for one in seen])
-            _stop_when_near(flown, np.linalg.norm(knots - flown, axis=-1), enough)
+            off = (knots - flown) * (1.0, 1.0, self._heights)
+            _stop_when_near(flown, np.linalg.norm(off, axis=-1), enough)
             there, least = np.concatenate([flown, there]), np.concatenate([enough, least])
         safe = least + config.field.d_safe - config.field.d_min
-        obstacles = Obstacles(tuple(range(len(there))), there, least, safe)
+        heights = np.ones(len(there))
+        heights[: len(seen)] = self._heights
+        obstacles = Obstacles(tuple(range(len(there))), there, least, safe, heights=heights)
         clamp, dt = _MAX_FORCE_FACTOR * config.limits.a_total, 1e-6 * config.certified.dt_us
         force = repulsion(knots, obstacles, config.field.gain, clamp, config.field.braking, dt)
         return limit(force, config.limits.a_total)[1:]
 
 
-def _stop_before_own_plan(centres: Array, own: Array, radii: Array) -> None:
+def _stop_before_own_plan(centres: Array, own: Array, radii: Array, heights: float) -> None:
     """Stop a ball before the first segment at which the own plan is inside it.
+
+    Differences in height are multiplied by ``heights``.
 
     From there on nothing can be guaranteed. A ball that moved on past the own plan would keep the vehicle
     from flying away from it.
     """
-    off = own - centres
+    off = (own - centres) * (1.0, 1.0, heights)
     caught = (np.vecdot(off, off) < radii[:, None] ** 2).any(axis=1)
     if caught.any():
         first = int(caught.argmax())

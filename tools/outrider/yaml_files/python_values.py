@@ -22,17 +22,22 @@ def input_error(
     Each line begins with ``where``.
     """
     schema = model.model_json_schema()
-    text = yaml.safe_dump(
-        to_jsonable_python(values, inf_nan_mode="constants", fallback=_plain),
-        sort_keys=False,
-        allow_unicode=True,
-    )
-    tree, _ = parse(text)
     found = error.errors(include_url=False, include_input=False)
-    if tree is None:
-        return InputError(*(f"{where}: {one['msg']}" for one in found))
-    flaws = model_flaws(tree, Schema(schema, schema), found)
-    return InputError(*(f"{where}: {flaw.what}" for flaw in dict.fromkeys(flaws)))
+    try:
+        text = yaml.safe_dump(
+            to_jsonable_python(values, inf_nan_mode="constants", fallback=_plain),
+            sort_keys=False,
+            allow_unicode=True,
+        )
+    except UnicodeDecodeError:
+        text = ""
+    tree, _ = parse(text)
+    flaws = () if tree is None else dict.fromkeys(model_flaws(tree, Schema(schema, schema), found))
+    # A fault that a file cannot have, such as bytes, is named as the model names it.
+    said = [flaw.what for flaw in flaws] or [
+        f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in found
+    ]
+    return InputError(*(f"{where}: {what}" for what in said))
 
 
 def _plain(value: Any) -> Any:

@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from companion.avoidance.certified.noncooperative import NonCooperative, NonCooperativeVehicle
 from companion.avoidance.certified.separating_planes import (
     Others,
     Planes,
@@ -15,6 +16,8 @@ from companion.avoidance.certified.separating_planes import (
     kept,
     planes,
 )
+from companion.config import CompanionConfig
+from companion.config.planning import FieldConfig
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.plans import STEPS, curves, later, random_plan
 
@@ -85,3 +88,15 @@ def test_one_above_another_must_be_further_away() -> None:
         lower = above - np.array((0.0, 0.0, 0.04))
         assert keeps(lower, above, below, distance, downwash=2.0) is far
     assert not keeps(above - np.array((0.0, 0.0, 0.06)), above, below, distance, downwash=2.0)
+
+
+def test_the_field_of_a_non_cooperative_vehicle_above_reaches_as_far_as_its_ellipsoid() -> None:
+    """At a scaled distance of 1.26 m, with 1.09 m as the least one, it pushes down; as a ball it is far."""
+    own = np.broadcast_to(np.array([0.0, 0.0, 5.0]), (STEPS, 3, 3))
+    above = NonCooperativeVehicle(np.array([0.0, 0.0, 8.79]), np.zeros(3), 0.0, 1.09, upright=False)
+    ball, ellipsoid = (
+        NonCooperative(CompanionConfig(field=FieldConfig(downwash=w)), STEPS).field([above], own)
+        for w in (1.0, 3.0)
+    )
+    assert (ball == 0.0).all()
+    assert (ellipsoid[:, 2] < 0.0).all()
