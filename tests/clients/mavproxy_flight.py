@@ -146,8 +146,9 @@ class MavProxySwarm:
             order = [first, *(system for system in systems if system != first)]
             for system in order:
                 if system != first:
-                    self._turn_to(system, "^DISARMED$")
-                    proxy.expect(r"Received \d+ parameters")
+                    # Both, in either order: parameters by FTP arrive before the next heartbeat.
+                    self._turn_to(system, r"^DISARMED$|Received \d+ parameters")
+                    proxy.expect(r"^DISARMED$|Received \d+ parameters")
                 self.heights[system] = -rise(proxy)[2]
             for system in reversed(order):
                 if system != order[-1]:

@@ -24,7 +24,7 @@ USUAL = re.compile(
     r"|Connect \S+ source_system=255|Log Directory: .*|Telemetry log: .*|Waiting for heartbeat from .*"
     r"|Detected vehicle \d:1 on link 0|online system \d|Set vehicle \d \(link 1\)|Mode [A-Z]+"
     r"|GPS lock at \d+ meters|Flight battery \d+ percent|waypoint \d|\d+: \w+ \{.*\}"
-    r"|Received \d+ parameters|Saved \d+ parameters to .*|[A-Z_]+ +[\d.]+"
+    r"|Received \d+ parameters(?: \(ftp\))?|Saved \d+ (?:parameters|defaults) to .*|[A-Z_]+ +[\d.]+"
     r"|Loaded 3 waypoints (?:from|in) .*|Sent all 3 waypoints|Got MISSION_ACK: TYPE_MISSION: ACCEPTED"
     r"|Requesting \d+ (?:waypoints|fence items|rally items) t=.*|\d+ \d [-\d. ]+ p1=.* auto=1"
     r"|Saved (?:3 )?waypoints to .*|Got COMMAND_ACK: [A-Z_]+: ACCEPTED|AP: Armed|AP: Landed, disarmed"
