@@ -56,23 +56,17 @@ class Unheard:
         each unheard one, and near it flies no faster than the ball grows. Returns ∞ if there are none in this
         direction.
         """
-        silences = self._silence(now, ages)
-        unheard = silences > self._after
+        off, gap = self._gaps(now, ages, here, place)
         size = float(np.sqrt(towards @ towards))
-        towards = towards * self._scale
-        if size < _LEVEL or not unheard.any():
+        if size < _LEVEL:
             return inf
-        # Distances, and the speed of approach, in the ellipsoid of ``field.downwash``.
-        off = (here[unheard] - place) * self._scale
-        distance = np.maximum(norms(off), _LEVEL)
-        closing = off @ towards / (size * distance)
+        closing = off @ (towards * self._scale) / (size * np.maximum(norms(off), _LEVEL))
         ahead = closing > 0.0
         if not ahead.any():
             return inf
-        gap = np.maximum(distance - self._d_min - self.radii(silences[unheard]), 0.0)
         # The neighbour, too, comes nearer while this vehicle brakes.
         reach = self._braking * _REACTION_S
-        gap = gap[ahead]
+        gap = np.maximum(gap[ahead], 0.0)
         stopping = np.sqrt(reach * reach + 2.0 * self._braking * gap) - reach
         # Faster than the ball grows it flies only where a plan does not reach the ball.
         speeds = np.minimum(stopping, np.maximum(self._growth, gap / self._horizon_s - self._growth))
@@ -84,13 +78,18 @@ class Unheard:
         It has to where it could reach the ball of an unheard neighbour within a plan, at its present
         ``speed`` (m/s). Otherwise the field of places where nobody is would drive it into others.
         """
+        _, gap = self._gaps(now, ages, here, place)
+        return bool((gap < self._horizon_s * (speed + self._growth)).any())
+
+    def _gaps(self, now: int, ages: Ages, here: Array, place: Array) -> tuple[Array, Array]:
+        """Return the offsets (K, 3) of the unheard neighbours and their balls' distances (K,) from ``place``.
+
+        Both are in m, in the ellipsoid of ``field.downwash``; a negative distance is inside.
+        """
         silences = self._silence(now, ages)
         unheard = silences > self._after
-        if not unheard.any():
-            return False
         off = (here[unheard] - place) * self._scale
-        gap = norms(off) - self._d_min - self.radii(silences[unheard])
-        return bool((gap < self._horizon_s * (speed + self._growth)).any())
+        return off, norms(off) - self._d_min - self.radii(silences[unheard])
 
     def _silence(self, now: int, ages: Ages) -> Array:
         """Return the present or the longest recent silence (M,), µs, of neighbours whose ages grow.

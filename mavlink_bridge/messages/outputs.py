@@ -13,7 +13,6 @@ _UNKNOWN_COVARIANCE = (_NAN, *(0.0,) * 20)
 _CHANNELS = 16
 _ACTUATORS = 32
 _RC_CHANNELS = 18
-_MILLI_G = 9.80665e-3
 
 
 @message("ATTITUDE_TARGET")
@@ -145,28 +144,6 @@ class RcChannels(NamedTuple):
         count = len(self.channels)
         unused = (UNKNOWN_U16,) * (_RC_CHANNELS - count)
         return self.time_boot // 1000, *self.channels, *unused, count, self.rssi
-
-
-@message("SCALED_IMU", size_v1=22)
-class ScaledImu(NamedTuple):
-    """SCALED_IMU (26): as RAW_IMU."""
-
-    source: Source
-    time_boot: int
-    specific_force: Vector
-    body_rates: Vector
-    magnetic_field: Vector
-
-    @staticmethod
-    def decode(source: Source, fields: Fields) -> ScaledImu:
-        x, y, z = (value * _MILLI_G for value in fields[1:4])
-        p, q, r, mx, my, mz = (value / 1e3 for value in fields[4:10])
-        return ScaledImu(source, fields[0] * 1000, (x, y, z), (p, q, r), (mx, my, mz))
-
-    def encode(self) -> Fields:
-        force = (int16(value / _MILLI_G) for value in self.specific_force)
-        rest = (int16(value * 1e3) for value in (*self.body_rates, *self.magnetic_field))
-        return self.time_boot // 1000, *force, *rest, 0
 
 
 @message("SCALED_PRESSURE", size_v1=14)

@@ -106,14 +106,43 @@ class RawImu(NamedTuple):
 
     @staticmethod
     def decode(source: Source, fields: Fields) -> RawImu:
-        x, y, z = (value * _MILLI_G for value in fields[1:4])
-        p, q, r, mx, my, mz = (value / 1e3 for value in fields[4:10])
-        return RawImu(source, fields[0], (x, y, z), (p, q, r), (mx, my, mz))
+        return RawImu(source, fields[0], *_measured(fields[1:10]))
 
     def encode(self) -> Fields:
-        force = (int16(value / _MILLI_G) for value in self.specific_force)
-        rest = (int16(value * 1e3) for value in (*self.body_rates, *self.magnetic_field))
-        return self.time_boot, *force, *rest, 0, 0
+        return self.time_boot, *_scaled(*self[2:]), 0, 0
+
+
+@message("SCALED_IMU", size_v1=22)
+class ScaledImu(NamedTuple):
+    """SCALED_IMU (26): as RAW_IMU."""
+
+    source: Source
+    time_boot: int
+    specific_force: Vector
+    body_rates: Vector
+    magnetic_field: Vector
+
+    @staticmethod
+    def decode(source: Source, fields: Fields) -> ScaledImu:
+        return ScaledImu(source, fields[0] * 1000, *_measured(fields[1:10]))
+
+    def encode(self) -> Fields:
+        return self.time_boot // 1000, *_scaled(*self[2:]), 0
+
+
+def _measured(fields: Fields) -> tuple[Vector, Vector, Vector]:
+    """Return specific force, body rates and magnetic field of nine integers, mg, mrad/s and mgauss."""
+    x, y, z = (value * _MILLI_G for value in fields[:3])
+    p, q, r, mx, my, mz = (value / 1e3 for value in fields[3:])
+    return (x, y, z), (p, q, r), (mx, my, mz)
+
+
+def _scaled(force: Vector, rates: Vector, field: Vector) -> Fields:
+    """Return the nine integers of ``_measured``."""
+    return (
+        *(int16(value / _MILLI_G) for value in force),
+        *(int16(value * 1e3) for value in (*rates, *field)),
+    )
 
 
 @message("HIGHRES_IMU", finite=True, size_v1=62)

@@ -8,25 +8,19 @@ from __future__ import annotations
 
 import json
 import lzma
-import zlib
 from collections.abc import Callable, Mapping
 from typing import Final
 from urllib.parse import parse_qs
 
 from sitl.autopilot.parameters.packed import described, packed
 from sitl.autopilot.parameters.values import Values
+from sitl.values.checksum import crc32
 
 GENERAL: Final = "etc/extras/component_general.json.xz"
 _PARAMETERS: Final = "etc/extras/parameters.json.xz"
 _PACKED: Final = "@PARAM/param.pck"
 # COMP_METADATA_TYPE_PARAMETER
 _TYPE_PARAMETER: Final = 1
-_ALL_ONES: Final = 0xFFFFFFFF
-
-
-def crc32(data: bytes, crc: int = 0) -> int:
-    """Return MAVLink's CRC-32, without inversion at either end, of ``data`` after ``crc``."""
-    return zlib.crc32(data, crc ^ _ALL_ONES) ^ _ALL_ONES
 
 
 class ComponentFiles:

@@ -13,7 +13,8 @@ from typing import Any, Final, NamedTuple
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import FileTransfer, Message, Source
-from sitl.autopilot.component_files import ComponentFiles, crc32
+from sitl.autopilot.component_files import ComponentFiles
+from sitl.values.checksum import crc32
 
 _HEADER: Final = Struct("<HBBBBBxI")
 _SIZE: Final = Struct("<I")

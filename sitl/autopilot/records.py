@@ -8,6 +8,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import (
+    BY_TYPE,
     AvailableModesMonitor,
     ComponentMetadata,
     CurrentMode,
@@ -101,7 +102,7 @@ class Records:
         telemetry.add(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR, monitor)
         if self._px4:
             telemetry.add(mavlink.MAVLINK_MSG_ID_CURRENT_MODE, current)
-            telemetry.add(397, metadata)
+            telemetry.add(BY_TYPE[ComponentMetadata].id, metadata)
 
     def _moment(self, now: int) -> Moment:
         estimate = self._plant.estimate()

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mavlink_bridge.messages import Vector
-from sitl.values.attitudes import quaternion
+from sitl.values.attitudes import of_thrust
 from sitl.vehicle.airframe import FloatArray, hover_speeds
 from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.ground import GRAVITY
@@ -131,9 +131,9 @@ class PointVehicle:
         """True state after the last step."""
         position, velocity, acceleration = self._motion.copy()
         rates = np.array((0.0, 0.0, self._yaw_rate))
-        return VehicleState(
-            position, velocity, _attitude(acceleration, self._yaw), rates, self._turns.copy(), acceleration
-        )
+        north, east, down = acceleration.tolist()
+        attitude = np.array(of_thrust((north, east, down - GRAVITY), self._yaw))
+        return VehicleState(position, velocity, attitude, rates, self._turns.copy(), acceleration)
 
     @property
     def on_ground(self) -> bool:
@@ -144,15 +144,3 @@ class PointVehicle:
     def air(self) -> Vector:
         """Still air: wind has no effect."""
         return 0.0, 0.0, 0.0
-
-
-def _attitude(acceleration: FloatArray, yaw: float) -> FloatArray:
-    """Return the attitude (4,), w, x, y, z, of a multirotor whose thrust gives ``acceleration`` (3,), NED.
-
-    ``yaw`` is its Euler angle.
-    """
-    x, y, z = (-acceleration[0], -acceleration[1], GRAVITY - acceleration[2])
-    ahead, aside = math.cos(yaw) * x + math.sin(yaw) * y, math.cos(yaw) * y - math.sin(yaw) * x
-    roll = math.atan2(-aside, math.hypot(ahead, z))
-    pitch = math.atan2(ahead, z) if math.hypot(ahead, z) > 0.0 else 0.0
-    return np.array(quaternion(roll, pitch, yaw))

@@ -5,7 +5,6 @@ A message about which the simulation knows nothing (sticks, the board's supply) 
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -22,7 +21,7 @@ from mavlink_bridge.messages import (
     UtmGlobalPosition,
 )
 from sitl.telemetry.reports import Snapshot
-from sitl.values.attitudes import quaternion
+from sitl.values.attitudes import of_thrust, quaternion
 from sitl.values.setpoints import POSITION, mask_of
 from sitl.vehicle.ground import GRAVITY
 
@@ -53,13 +52,8 @@ def attitude_target(s: Snapshot) -> Message | None:
     if demand is None:
         return None
     (north, east, down), yaw = demand
-    # Specific force in the heading's axes; the body's z axis points against it.
-    c, n = math.cos(yaw), math.sin(yaw)
-    x, y, z = c * north + n * east, c * east - n * north, down - GRAVITY
-    pitch, roll = math.atan2(-x, -z), math.asin(max(-1.0, min(1.0, y / math.sqrt(x * x + y * y + z * z))))
-    return AttitudeTarget(
-        s.source, s.time, quaternion(roll, pitch, yaw), (0.0, 0.0, 0.0), s.throttle(), _RATES_IGNORED
-    )
+    attitude = of_thrust((north, east, down - GRAVITY), yaw)
+    return AttitudeTarget(s.source, s.time, attitude, (0.0, 0.0, 0.0), s.throttle(), _RATES_IGNORED)
 
 
 def position_target_global(s: Snapshot) -> Message | None:

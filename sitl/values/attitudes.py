@@ -30,6 +30,18 @@ def euler(attitude: Quaternion) -> Vector:
     return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
+def of_thrust(force: Vector, yaw: float) -> Quaternion:
+    """Return the attitude of a multirotor with heading ``yaw`` (rad) whose thrust makes ``force``.
+
+    That is the specific force (m/s², NED), the acceleration without gravity; the body's z axis points against
+    it.
+    """
+    north, east, down = force
+    c, s = math.cos(yaw), math.sin(yaw)
+    ahead, aside = c * north + s * east, c * east - s * north
+    return quaternion(math.atan2(aside, math.hypot(ahead, down)), math.atan2(-ahead, -down), yaw)
+
+
 def to_body(attitude: Quaternion, vector: Vector) -> Vector:
     """Rotate ``vector`` from NED to body axes (FRD)."""
     w, *axis = attitude

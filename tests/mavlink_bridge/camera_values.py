@@ -11,6 +11,7 @@ from mavlink_bridge import messages as m
 from tests.mavlink_bridge.wire_values import (
     boot,
     f32,
+    four,
     latitude,
     longitude,
     scaled,
@@ -23,7 +24,6 @@ from tests.mavlink_bridge.wire_values import (
     vector,
 )
 
-four = st.tuples(f32, f32, f32, f32)
 two = st.tuples(f32, f32)
 maybe = st.none() | f32
 printable = st.characters(min_codepoint=33, max_codepoint=126)

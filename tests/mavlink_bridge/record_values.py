@@ -10,6 +10,7 @@ from mavlink_bridge import messages as m
 from tests.mavlink_bridge.wire_values import (
     boot,
     f32,
+    four,
     latitude,
     longitude,
     millimetres,
@@ -24,7 +25,6 @@ from tests.mavlink_bridge.wire_values import (
     vector,
 )
 
-four = st.tuples(f32, f32, f32, f32)
 milli = scaled(signed(16), 1e3)
 force = signed(16).map(lambda value: value * 9.80665e-3)
 short = text.map(lambda value: value[:35])

@@ -12,6 +12,7 @@ from mavlink_bridge.key import Key
 from tests.mavlink_bridge.wire_values import (
     boot,
     f32,
+    four,
     latitude,
     longitude,
     millimetres,
@@ -26,7 +27,6 @@ from tests.mavlink_bridge.wire_values import (
     yaw,
 )
 
-four = st.tuples(f32, f32, f32, f32)
 name = st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=16)
 raw = st.binary(min_size=4, max_size=4)
 percent = scaled(st.integers(0, 100), 100)

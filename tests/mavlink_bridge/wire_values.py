@@ -26,6 +26,7 @@ def vector(of: st.SearchStrategy[float]) -> st.SearchStrategy[tuple[float, ...]]
 
 
 f32 = st.floats(width=32, allow_nan=False, allow_infinity=False)
+four = st.tuples(f32, f32, f32, f32)
 u8, u16, u32, u64 = unsigned(8), unsigned(16), unsigned(32), unsigned(64)
 source = st.builds(m.Source, u8, u8)
 boot = u32.map(lambda ms: ms * 1000)

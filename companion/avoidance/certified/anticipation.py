@@ -14,9 +14,7 @@ it flies to the side of the turn and ahead, one beside which the vehicle would s
 
 from __future__ import annotations
 
-from math import atan2, hypot
-
-import numpy as np
+from math import atan2, copysign, hypot
 
 from companion.config.certified import AnticipationConfig
 from companion.values.horizon import Array
@@ -48,7 +46,7 @@ def anticipated_turn(
     """
     way = goal - own[1]
     length = hypot(way[0], way[1])
-    if config.most == 0.0 or length < _NEAR_GOAL_M or not len(others):
+    if length < _NEAR_GOAL_M:
         return 0.0
     x, y = way[0] / length, way[1] / length
     speed = max(hypot(*(own[1] - own[0])[:2]) / seconds, _LEAST_SPEED_M_S)
@@ -66,7 +64,7 @@ def anticipated_turn(
         if not 0.0 < after <= config.look or speed * after > length + _NEAR_GOAL_M:
             continue
         p, q = p + after * u, q + after * v
-        away = np.copysign(hypot(p, q), sense * (x * q - y * p))
+        away = copysign(hypot(p, q), sense * (x * q - y * p))
         if not -config.wrong_side * distance <= away < distance:
             continue
         beside = min(max(sense * (velocity[0] * y - velocity[1] * x), 0.0), 1.0)

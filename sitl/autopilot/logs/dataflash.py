@@ -12,7 +12,6 @@ from typing import Final
 
 from sitl.autopilot.logs.moment import Moment
 
-_FMT: Final = Struct("<BB4s16s64s")
 # Name, DataFlash format, struct, columns. c is cdeg as int16 in the format's table; f avoids its rounding.
 _TYPES: Final = {
     0x80: ("FMT", "BBnNZ", "BB4s16s64s", "Type,Length,Name,Format,Columns"),

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from mavlink_bridge.messages import (
+    LOG_DATA_LENGTH,
     LogData,
     LogEntry,
     LogErase,
@@ -21,7 +22,6 @@ from mavlink_bridge.messages import (
 from sitl.autopilot.logs.recorder import Log, Recorder
 from sitl.telemetry.status_text import StatusReporter
 
-_LENGTH: Final = 90
 _BURST, _BURST_INTERVAL_US = 10, 10_000
 _MOST_DOWNLOADS: Final = 16
 _NEVER: Final = 1 << 62
@@ -60,10 +60,10 @@ class LogProtocol:
         self._downloads = {}
         for client, (contents, number, offset, end) in going.items():
             for _ in range(_BURST):
-                data = bytes(contents[offset : min(offset + _LENGTH, end)])
+                data = bytes(contents[offset : min(offset + LOG_DATA_LENGTH, end)])
                 self._outbox.append(LogData(self._source, offset, number, data))
                 offset += len(data)
-                if len(data) < _LENGTH or offset >= end:
+                if len(data) < LOG_DATA_LENGTH or offset >= end:
                     break
             else:
                 self._downloads[client] = contents, number, offset, end

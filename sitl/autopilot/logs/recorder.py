@@ -12,7 +12,6 @@ from sitl.autopilot.logs.ulog import Ulog
 _PERIOD_US: Final = 100_000
 # Eight logs of at most 4 MiB: some seven hours of flight.
 _MOST_LOGS, _MOST_BYTES = 8, 4 << 20
-_NEVER: Final = 1 << 62
 
 
 class Log:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import zlib
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
-from typing import Final
 
 from sitl.autopilot.parameters.parameter import Bound, Parameter, encoded
 from sitl.config.autopilot import AutopilotConfig
-
-_ALL_ONES: Final = 0xFFFFFFFF
+from sitl.values.checksum import crc32
 
 
 class Values:
@@ -97,7 +94,7 @@ class Values:
         crc = 0
         for parameter, value in zip(self.table, self._values, strict=True):
             data = parameter.name.encode() + encoded(value, parameter.kind, bytewise=True)
-            crc = zlib.crc32(data, crc ^ _ALL_ONES) ^ _ALL_ONES
+            crc = crc32(data, crc)
         return crc
 
 

@@ -33,15 +33,15 @@ def cells_of(comparison: Comparison, where: Path, rows: Sequence[Row], folder: P
     found = []
     for number, row in enumerate(rows, 1):
         changed = overlay(base, {**comparison.set, **row.set})
-        count = changed["vehicles"]
+        count = int(str(changed["vehicles"]))
         given = []
         if folder is not None and comparison.missions is not None:
-            given = folder_of(folder, int(str(count)), comparison.missions.offset)
+            given = folder_of(folder, count, comparison.missions.offset)
         scene = Scene(
             scenario=changed,
             measure=comparison.measure,
             goal_radius=comparison.goal_radius,
-            vehicles=int(str(count)),
+            vehicles=count,
             missions=comparison.missions,
             given=tuple((_places(one.starts), _places(one.goals)) for one in given),
         )

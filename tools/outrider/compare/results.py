@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from statistics import fmean, median
 from typing import Any
@@ -106,7 +106,7 @@ def result_of(
         loss=float(links["swarm"]["loss"]),
         reaches_bar=None,
     )
-    return Result(**{**asdict(found), "reaches_bar": _reaches(row, found)})
+    return replace(found, reaches_bar=_reaches(row, found))
 
 
 def _reaches(row: Row, found: Result) -> bool | None:

@@ -18,7 +18,6 @@ from outrider.view.bodies import AWAY, IDENTITY, Bodies
 from outrider.view.trails import Trails
 
 WORLD = "/world"
-_AWAY = AWAY
 _MAX_SIZE_FACTOR, _SIZE_SHARE = 3.0, 0.09
 """Limits of the drawn size of a vehicle.
 
@@ -28,7 +27,6 @@ value times the span.
 _VIEW_SHARE = 0.18
 """Length of a drawn field of view, as a share of the scene's reach."""
 _TARGET = rgb(TARGET)
-_IDENTITY = IDENTITY
 _SCALE_LABELS = 2
 """Number of labelled distances in each direction from the middle of the ground."""
 _NO_LINE = np.zeros((1, 2, 3))
@@ -79,8 +77,8 @@ class Renderer:
         self._planes = stage.add_batched_meshes_simple(
             f"{WORLD}/planes",
             *shapes.tile(),
-            batched_wxyzs=np.tile(_IDENTITY, (MOST, 1)),
-            batched_positions=np.tile(_AWAY, (MOST, 1)),
+            batched_wxyzs=np.tile(IDENTITY, (MOST, 1)),
+            batched_positions=np.tile(AWAY, (MOST, 1)),
             batched_scales=np.full(MOST, 0.15 * scene.reach),
             batched_colors=linear(ACCENT),
             opacity=0.2,
@@ -107,7 +105,7 @@ class Renderer:
                 str(system),
                 font_screen_scale=0.9 if count <= 16 else 0.6,
                 anchor="bottom-center",
-                position=_AWAY,
+                position=AWAY,
             )
             for system in scene.systems
         ]
@@ -147,8 +145,8 @@ class Renderer:
         for one in (*past, moment):
             self._trails.see(one.time, one.position)
         there = np.asarray(np.isfinite(moment.position).all(axis=1))
-        place = np.where(there[:, None], moment.position, _AWAY).astype(np.float32)
-        attitude = np.where(np.isfinite(moment.attitude), moment.attitude, _IDENTITY).astype(np.float32)
+        place = np.where(there[:, None], moment.position, AWAY).astype(np.float32)
+        attitude = np.where(np.isfinite(moment.attitude), moment.attitude, IDENTITY).astype(np.float32)
         self._bodies.show(moment.time, place, attitude)
         for handle in (self._shells, self._reach):
             handle.batched_positions = place
@@ -207,8 +205,8 @@ class Renderer:
         return self._stage.add_batched_meshes_simple(
             f"{WORLD}/{name}",
             *mesh,
-            batched_wxyzs=np.tile(_IDENTITY, (count, 1)),
-            batched_positions=np.tile(_AWAY, (count, 1)),
+            batched_wxyzs=np.tile(IDENTITY, (count, 1)),
+            batched_positions=np.tile(AWAY, (count, 1)),
             batched_scales=np.full(count, scale),
             batched_colors=paint,
             lod="off",
@@ -314,8 +312,8 @@ def _drawn(scene: Scene) -> float:
 
 def _pool(found: Plane) -> tuple[Single, Single]:
     """Return positions (MOST, 3) and attitudes (MOST, 4) of the planes; unused planes are far away."""
-    place = np.tile(np.array(_AWAY, np.float32), (MOST, 1))
-    turned = np.tile(np.array(_IDENTITY, np.float32), (MOST, 1))
+    place = np.tile(np.array(AWAY, np.float32), (MOST, 1))
+    turned = np.tile(np.array(IDENTITY, np.float32), (MOST, 1))
     count = len(found.middle)
     place[:count], turned[:count] = found.middle, facing(found.normal)
     return place, turned
