@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from outrider import Flight
+from outrider import Flight, palette
 
 Array = NDArray[np.float64]
 
@@ -32,8 +32,7 @@ _REACH_M: Final = (11.5, 6.5)
 _TRAIL_S: Final = 3.0
 _LEAN: Final = radians(38.0)
 """Angle of the look below the horizon."""
-_COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
-_TARGET, _RING, _GROUND, _LINES, _WORDS = "#111111", "#8a8f98", "#f3f4f1", "#d9dcd6", "#3c4043"
+_RING, _GROUND, _LINES, _WORDS = (palette.LIGHT[name] for name in ("soft", "sky", "line", "soft"))
 _COLOURS_IN_PICTURE: Final = 64
 
 
@@ -43,8 +42,8 @@ def main() -> None:
     start = float(sys.argv[3]) if len(sys.argv) > 3 else 0.0
     frames = [_frame(flight, start + k * _FRAME_S * _SPEED) for k in range(_FRAMES)]
     some = np.vstack([np.asarray(frame) for frame in frames[:: len(frames) // 5]])
-    palette = Image.fromarray(some).quantize(_COLOURS_IN_PICTURE, Image.Quantize.MAXCOVERAGE)
-    quantised = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    chosen = Image.fromarray(some).quantize(_COLOURS_IN_PICTURE, Image.Quantize.MAXCOVERAGE)
+    quantised = [frame.quantize(palette=chosen, dither=Image.Dither.NONE) for frame in frames]
     quantised[0].save(
         place,
         save_all=True,
@@ -81,9 +80,12 @@ def _frame(flight: Flight, time: float) -> Image.Image:
     axes.plot(*_project(target[now] + surface, centre).T, color=_RING, lw=1.4, ls=(0, (4, 3)))
     back = max(now - round(_TRAIL_S * 50), 0)
     trails = flight.positions[back : now + 1 : 4].astype(np.float64)
-    _draw(axes, target[back : now + 1 : 4], centre, _TARGET, 9.0)
+    _draw(axes, target[back : now + 1 : 4], centre, palette.TARGET, 9.0)
+    right, up = _project(target[now : now + 1], centre)[0]
+    on = (palette.LIGHT["sky"],)
+    axes.text(right + 0.7, up, "target", color=palette.readable(palette.TARGET, on), va="center")
     for k in range(trails.shape[1]):
-        _draw(axes, trails[:, k], centre, _COLOURS[k % len(_COLOURS)], 7.0)
+        _draw(axes, trails[:, k], centre, palette.hex_of(k), 7.0)
     separation = float(np.min(flight.separation[max(now - 50, 0) : now + 1]))
     words = f"{flight.scenario.name}   {time:4.1f} s   least distance of two vehicles {separation:4.1f} m"
     axes.text(
