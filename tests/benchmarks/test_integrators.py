@@ -25,6 +25,7 @@ class Wilful:
         return preferred
 
 
+@pytest.mark.slow
 @given(MANNERS, st.floats(1.0, 40.0))
 def test_it_keeps_its_limits_and_takes_no_less_than_it_must(manner: FreeMotion, length: float) -> None:
     wilful = Wilful()

@@ -24,6 +24,7 @@ FINISHING = 1
 AT_S = 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", [{}, MEASURED], ids=["own", "measured"])
 def test_a_plan_is_finished_and_the_others_fly_on(time: dict[str, Any], tmp_path: Path) -> None:
     of = scenario("antipodal-8", {**SWAP, "cap_s": 25.0}, time)

@@ -175,6 +175,7 @@ def test_the_backup_node_has_the_time_of_its_companion(fault: dict[str, Any], tm
     assert flown.summary["converged"] is (fault["kind"] == "freeze")
 
 
+@pytest.mark.slow
 def test_a_run_is_certified_and_replayed_whatever_the_clocks(tmp_path: Path) -> None:
     of = scenario("antipodal-8", SWAP, {"faults": [*MINUTES, *DRIFT], "cap_s": 8.0}, DISCIPLINED)
     directory = tmp_path / "run"

@@ -41,6 +41,7 @@ def swapped(shift: float, off: tuple[float, float], directory: Path) -> Flown:
     return fly(scenario("antipodal-8", change), 1, directory)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [0.0, 0.5, 1.0, 1.5])
 def test_two_whose_estimates_are_off_towards_each_other_stay_apart(shift: float, tmp_path: Path) -> None:
     """They pass on the left if the goals lead them there, otherwise on the right."""

@@ -256,6 +256,7 @@ ROWS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [pytest.param(row, id=row.name) for row in ROWS])
 def test_a_fault(row: Row, tmp_path: Path) -> None:
     flown = fly(scenario("antipodal-8", SWAP, row.changes), 1, tmp_path)

@@ -37,6 +37,7 @@ BLOCKED: dict[str, Any] = {
 ROUGH = {"sensors": "rtk", "weather": {"wind": [0.0, 4.0, 0.0], "turbulence": "light"}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changes", [{}, ROUGH], ids=["calm", "rtk, wind"])
 def test_what_stands_in_the_way_is_not_touched(changes: dict[str, Any], tmp_path: Path) -> None:
     of = scenario("antipodal-8", BLOCKED, changes)
@@ -59,6 +60,7 @@ def test_what_stands_in_the_way_is_not_touched(changes: dict[str, Any], tmp_path
     assert exit_status(flown.summary) == 0
 
 
+@pytest.mark.slow
 def test_who_starts_too_near_is_told_of(tmp_path: Path) -> None:
     """0.4 m from a post are one encounter, though the vehicle leaves at once."""
     changes = {
@@ -85,6 +87,7 @@ HOPPING = {
 }
 
 
+@pytest.mark.slow
 def test_a_target_that_jumps_is_followed_each_time(tmp_path: Path) -> None:
     of = scenario("scenario-1", HOPPING)
     flown = fly(of, 1, tmp_path)

@@ -58,6 +58,7 @@ ROWS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [pytest.param(row, id=row.name) for row in ROWS])
 def test_the_tube_at_full_speed(row: Row, tmp_path: Path) -> None:
     flown = fly(scenario("antipodal-8", LANES, row.changes), 1, tmp_path)

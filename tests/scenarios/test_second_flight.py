@@ -12,6 +12,7 @@ from tests.scenarios.single_vehicle import LAND, MODE, OPERATOR, SYSTEM, SingleV
 PREARM = 0x10000000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
 def test_two_flights_in_a_row(flavour):
     vehicle = SingleVehicle(flavour)

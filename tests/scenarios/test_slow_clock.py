@@ -23,6 +23,7 @@ def uneven(rate, stall, every):
     return pace
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pace", "share"),
     [(uneven(0.94, 0, 1.0), 0.06), (uneven(0.99, 0, 1.0), 0.01), (uneven(1.0, 400_000, 7.0), 0.057)],

@@ -120,12 +120,14 @@ def test_east_and_west_are_mirror_images(methods: tuple[str, ...], sense: str) -
     assert_alike(fly("swap", methods, sense, EAST_WEST), samples, EAST_WEST)
 
 
+@pytest.mark.slow
 def test_at_the_equator_so_are_north_and_south() -> None:
     methods, sense = ("swivel", "tangential"), "right"
     image = fly("orbit", methods, sense, NORTH_SOUTH, latitude=EQUATOR)
     assert_alike(image, flown("orbit", methods, sense, EQUATOR), NORTH_SOUTH)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", TASKS)
 def test_a_quarter_turned_it_is_the_same_flight(task: str) -> None:
     methods, sense = ("tangential",), "right"

@@ -83,6 +83,7 @@ def test_a_flood_takes_no_telemetry_from_others_and_no_answer_either(flavour: st
         assert all(len(data) <= LONGEST for data in sent)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [*ASKED, "everything"])
 def test_nothing_of_a_flood_is_kept(kind: str) -> None:
     """Two thousand more of them, each another, leave no more behind than those before."""

@@ -59,6 +59,7 @@ def test_the_second_start_loads_and_says_nothing(tmp_path: Path) -> None:
     assert start(tmp_path) == ["twice 8.0 loaded"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
 @pytest.mark.parametrize("share", [0.0, 0.5])
 def test_a_damaged_store_is_replaced(suffix: str, share: float, tmp_path: Path) -> None:

@@ -265,6 +265,7 @@ def test_a_vehicle_that_states_nothing_is_found(run: Path, replay: Replay) -> No
     assert [13, 11, 12] in [one["who"] for one in found if one["what"] == "a plan without a statement"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "options"), [(1, PLANAR), (1, LOSSY), (2, LOSSY), (3, SLOW)])
 def test_flights_with_loss_and_delay_are_certified(seed: int, options: Options, tmp_path: Path) -> None:
     run = fly(tmp_path / "run", 4, seed=seed, options=options)
@@ -349,6 +350,7 @@ def taken_again(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Pair, "newer", lambda self, one, than: one not in self.kept)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("breaks", "whats"),
     [
@@ -376,6 +378,7 @@ def test_companions_that_break_a_rule_are_found(
     pytest.fail("twenty flights were certified")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("waits", [True, False])
 def test_a_take_off_and_a_landing_without_waiting_are_found(
     waits: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

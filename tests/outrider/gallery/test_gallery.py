@@ -23,6 +23,7 @@ from outrider.sweep.runs import Ending, Run, run_of
 from outrider.sweep.tasks import Entry
 
 
+@pytest.mark.slow
 def test_every_scenario_is_flown_in_every_way() -> None:
     assert set(scenarios()) == {path.stem for path in (config_root() / "scenarios").iterdir()}
     shown = showings(chosen(()))

@@ -69,6 +69,7 @@ def test_the_table_is_that_of_the_runs(here: Path, capsys: pytest.CaptureFixture
         assert Path(f"out/{picture}.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_without_a_violation_being_stuck_is_a_result(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert paper(2, out=Path("out"), rows=THREE, run="tests.outrider.paper.runs:fine") == 0
     said = capsys.readouterr()

@@ -55,7 +55,7 @@ def covering(figure: Figure) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("vehicles", [1, 8, 24, 25, 200])
+@pytest.mark.parametrize("vehicles", [1, 8, 24, 25, pytest.param(200, marks=pytest.mark.slow)])
 def test_every_path_is_drawn_and_few_are_named(
     vehicles: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

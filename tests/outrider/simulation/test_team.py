@@ -59,7 +59,9 @@ def figures(flight: Flight) -> dict[str, object]:
     return {key: value for key, value in summary.items() if key not in WALL_FIELDS}
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "calm" else []) for name in FLIGHTS]
+)
 def test_any_number_of_processes_gives_the_same_bytes(name: str, tmp_path: Path) -> None:
     of = scenario("antipodal-8", **{**SHORT, **FLIGHTS[name]})
     one, logs = flown(of, 1, tmp_path / "1")

@@ -69,6 +69,7 @@ def test_the_page_stands_alone_and_says_what_the_table_says() -> None:
     assert '<h1 class="bad">6 runs, 2 at fault</h1>' in page
 
 
+@pytest.mark.slow
 def test_every_failure_becomes_a_scenario_that_flies_what_failed() -> None:
     assert fly() == 1
     assert fly(regressions="kept/here") == 1

@@ -35,6 +35,7 @@ def flight(physics: str, flavour: str) -> tuple[np.ndarray, Rig]:
     return np.array(track), rig
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_it_follows_set_points_and_lands_as_on_our_own_physics(flavour):
     (own, own_rig), (jsbsim, rig) = flight("own", flavour), flight("jsbsim", flavour)

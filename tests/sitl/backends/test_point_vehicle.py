@@ -57,6 +57,7 @@ def test_a_point_is_exactly_where_its_reference_is() -> None:
     assert np.array_equal(true[:, 1], wanted[:, 1])
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1))
 def test_the_jerk_of_an_averaged_point_is_bounded_by_the_steps_of_acceleration(seed: int) -> None:
     knots = np.vstack([braking(np.random.default_rng(seed), 5), np.zeros((2, 3))])

@@ -50,6 +50,7 @@ def test_any_two_plans_are_apart_whatever_happens(swarm: Swarm) -> None:
     assert not swarm.faults()
 
 
+@pytest.mark.slow
 @FLIGHTS
 @given(swarms(leave=True))
 def test_they_are_also_where_some_leave(swarm: Swarm) -> None:
@@ -134,6 +135,7 @@ def test_every_plan_follows_from_the_one_before_it(swarm: Swarm) -> None:
             assert epoch % step == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rough", ROUGH, ids=lambda rough: f"{rough.loss}-{rough.delay}")
 def test_seeded_flights_are_apart_and_get_somewhere(rough: Rough) -> None:
     made = 0
