@@ -52,14 +52,15 @@ class ClockWatch:
     def receive(self, now: int, message: Timesync) -> list[Timesync]:
         """Receive a TIMESYNC: return the reply to a request, or update the bounds by a reply.
 
-        A reply is used if it answers a request that this vehicle made in the last 10 s, and comes from a
-        companion: an autopilot may answer as well, with the time since it was switched on.
+        Only companions count. Where links are joined, autopilots ask as well, PX4 ten times a second, and
+        each of them would be answered by every companion; and they answer, with the time since they were
+        switched on. A reply is used if it answers a request that this vehicle made in the last 10 s.
         """
+        if message.source.component != self._own.component:
+            return []
         if message.tc1 == 0:
             return [Timesync(self._own, now * _NS_PER_US, message.ts1)]
         asked, system = divmod(message.ts1, _NS_PER_US)
-        if message.source.component != self._own.component:
-            return []
         if system != self._own.system or not 0 <= now - asked <= 10 * _PERIOD_US:
             return []
         shown = message.tc1 // _NS_PER_US
