@@ -27,6 +27,7 @@ from companion.obstacles.shared_plans import SharedPlans
 from companion.obstacles.trusted_peers import TrustedPeers, follows
 from companion.obstacles.uncertainty import ReportedUncertainty
 from companion.obstacles.unheard import Unheard
+from companion.values.components import COMPONENT
 from companion.values.horizon import Array
 from companion.values.mates import Mates
 from companion.values.obstacles import Obstacles
@@ -40,7 +41,10 @@ from mavlink_bridge.wire.uncertainty import PAYLOAD_TYPE as DOUBT
 _SYSTEM_IDS = 255
 """Number of system ids."""
 _PRIORITY_US = 1_000_000
-"""µs after a companion's position during which positions of the same vehicle's autopilot are ignored."""
+"""µs after a component's position during which those of the same vehicle's lower components are ignored.
+
+See ``_rank``.
+"""
 _KEPT_US = 3_000_000
 """A vehicle stays in a perception formation for this time (µs) after its last plan or position."""
 _FLEET_US = 5_000_000
@@ -71,21 +75,39 @@ def fading(config: CompanionConfig) -> Array | None:
     return np.asarray(np.exp(-ahead / config.guard.astray_us))[:, None]
 
 
+def _rank(component: int) -> int:
+    """Return the priority of a component as the source of its vehicle's position.
+
+    An outrider companion comes first, and the autopilot last.
+    """
+    if component == COMPONENT:
+        return 2
+    return 0 if component == mavlink.MAV_COMP_ID_AUTOPILOT1 else 1
+
+
 class _Sender:
     """A system whose position is known.
 
-    ``track``, ``row`` of its last state; ``by_autopilot``: whether the track uses its autopilot's messages.
-    ``companion_time``: when (µs) its companion last reported its position; ``received``: when (µs) a message
-    last changed its time.
+    ``track``, ``row`` of its last state; ``component``: the one whose messages the track uses, because each
+    has a clock and errors of its own. ``reported``: when (µs) this one last reported a usable position;
+    ``received``: when (µs) a message last changed the track's time.
     """
 
-    __slots__ = ("by_autopilot", "companion_time", "received", "row", "track")
+    __slots__ = ("component", "received", "reported", "row", "track")
 
-    def __init__(self, track: Track, row: int) -> None:
-        self.track, self.row = track, row
-        self.by_autopilot = False
-        self.companion_time = -_PRIORITY_US
+    def __init__(self, track: Track, row: int, component: int) -> None:
+        self.track, self.row, self.component = track, row, component
+        self.reported = -_PRIORITY_US
         self.received = 0
+
+    @property
+    def by_autopilot(self) -> bool:
+        """Whether the track uses the autopilot's messages."""
+        return self.component == mavlink.MAV_COMP_ID_AUTOPILOT1
+
+    def prefers(self, now: int, component: int) -> bool:
+        """Return whether messages of another ``component`` are ignored at ``now`` (µs)."""
+        return _rank(component) <= _rank(self.component) and now - self.reported < _PRIORITY_US
 
 
 class Neighbours:
@@ -149,12 +171,12 @@ class Neighbours:
         system, component = message.source
         if system == self._system:
             return
-        by_autopilot = component == mavlink.MAV_COMP_ID_AUTOPILOT1
         sender = self._senders.get(system)
-        if by_autopilot and sender is not None and now - sender.companion_time < _PRIORITY_US:
-            # The vehicle's companion reports the position already, dated by another clock.
+        changes = sender is not None and sender.component != component
+        if changes and sender is not None and sender.prefers(now, component):
+            # Another component reports the position already, dated by another clock.
             return
-        if sender is None or sender.by_autopilot != by_autopilot:
+        if sender is None or changes:
             track = Track(self._config.neighbour)
             track.brief = self._brief
         else:
@@ -168,14 +190,13 @@ class Neighbours:
         # Negative if late measurements make the track accept others that it had refused.
         refused = 0 if before is None else belief.refused - before.refused
         if sender is None:
-            sender = self._senders[system] = _Sender(track, self._add(now, system))
+            sender = self._senders[system] = _Sender(track, self._add(now, system), component)
         elif track is not sender.track or refused or belief.doubts:
             self._trusted.restart(now, sender.row)
-        sender.track, sender.by_autopilot = track, by_autopilot
-        if not by_autopilot and (accepted or refused > 0):
-            # Unusable positions, such as those of a receiver without a fix, do not suppress the autopilot's
-            # messages.
-            sender.companion_time = now
+        sender.track, sender.component = track, component
+        if accepted or refused > 0:
+            # Unusable positions, such as those of a receiver without a fix, suppress nobody's messages.
+            sender.reported = now
         if time != time_before:
             sender.received = now
         self._fresh[sender.row] = belief.x, time, sender.received
@@ -216,9 +237,9 @@ class Neighbours:
         if not self.relevance.ignores(system):
             return False
         sender = self._senders.get(system)
-        if component != mavlink.MAV_COMP_ID_AUTOPILOT1 and sender is not None and not sender.by_autopilot:
-            # The companion's ignored messages still have priority over its autopilot's.
-            sender.companion_time = self.relevance.now
+        if sender is not None and component == sender.component:
+            # The ignored messages still have priority over those of other components.
+            sender.reported = self.relevance.now
         return True
 
     def _trusted_rows(self) -> NDArray[np.bool_]:

@@ -269,6 +269,38 @@ def test_of_a_companion_that_loses_its_fix_the_autopilot_is_heard_after_a_second
         np.testing.assert_allclose(there, x if k < 59 else x + off, atol=0.1)
 
 
+@pytest.mark.parametrize(
+    ("used", "other"), [(195, 191), (195, 220), (191, 220), (220, 191), (191, 1), (195, 1)]
+)
+@pytest.mark.parametrize("boot", [5_000_000, 400_000_000])
+def test_of_two_components_of_a_vehicle_one_alone_makes_its_track(used, other, boot):
+    """Each has a clock and a filter of its own; the other one is off by three metres and speaks twice as
+    often."""
+    with_it, without = (Neighbours(CONFIG, OWN, FLEET) for _ in range(2))
+    for k in range(60):
+        now, x = NOW + k * 200_000, X + 0.2 * k * V
+        mine = position(x, V)._replace(source=Source(OTHER, used), time_boot=10**7 + k * 200_000)
+        apart = position(x + np.array([0.0, 3.0, 0.0]), V)
+        apart = apart._replace(source=Source(OTHER, other), time_boot=boot + k * 200_000)
+        for neighbours in (with_it, without):
+            neighbours.receive_position(now + DELAY, mine)
+        with_it.receive_position(now + DELAY, apart)
+        with_it.receive_position(now + DELAY + 100_000, apart._replace(time_boot=apart.time_boot + 100_000))
+        one, alone = (neighbours.obstacles(now + DELAY).positions for neighbours in (with_it, without))
+        np.testing.assert_array_equal(one, alone)
+
+
+def test_the_companion_of_the_fleet_comes_before_other_components():
+    neighbours, off = Neighbours(CONFIG, OWN, FLEET), np.array([0.0, 3.0, 0.0])
+    for k in range(40):
+        now, x = NOW + k * 100_000, X + 0.1 * k * V
+        neighbours.receive_position(now + DELAY, position(x + off, V)._replace(source=Source(OTHER, 191)))
+        if 10 <= k < 20:
+            neighbours.receive_position(now + DELAY, position(x, V)._replace(source=Source(OTHER, 195)))
+        there = neighbours.obstacles(now).positions[0, 0]
+        np.testing.assert_allclose(there, x if 10 <= k < 29 else x + off, atol=0.1)
+
+
 @pytest.mark.parametrize("off", [-0.3, -0.1, 0.08, -5.0, 5.0])
 def test_the_plans_of_a_wrong_clock_are_laid_where_their_sender_is(off):
     """Plans at 10 Hz of one at 4 m/s; a quarter of a metre is what fifty milliseconds are worth."""
