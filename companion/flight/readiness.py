@@ -15,7 +15,8 @@ from companion.flight.autopilots import Params, Profile
 from companion.flight.command_protocol import Commands
 from companion.flight.vehicle import Vehicle
 from companion.world import View
-from mavlink_bridge.messages import CommandAck, Message
+from mavlink_bridge.frames import LocalFrame
+from mavlink_bridge.messages import CommandAck, CommandLong, Message
 
 OPERATORS_GO = "the operator's go"
 """Value of ``missing`` when everything else is ready."""
@@ -42,9 +43,14 @@ HEALTH = 500_000
 A start does not require them: a vehicle may have neither.
 """
 
-
 UTC = 1_000_000
 """Interval (µs) of SYSTEM_TIME, which is requested where it is a source of fleet time."""
+_ORIGIN_US = 10_000_000
+"""Time (µs) between two requests for the origin in flight."""
+_ORIGIN_CALL = (
+    mavlink.MAV_CMD_REQUEST_MESSAGE,
+    (float(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+)
 
 
 def _interval(message: int, interval: int) -> tuple[int, Params]:
@@ -75,6 +81,8 @@ class Readiness:
         certified = config.certified
         self._utc = certified.fleet_time == "measured" and certified.time_sources.autopilot_us is not None
         self.limits = AutopilotLimits(config, vehicle, calls.own)
+        self._local: LocalFrame | None = None
+        self._confirm_at = 0
 
     def receive(self, ack: CommandAck) -> None:
         """Receive an acknowledgement of the autopilot, for the requests of ``wishes``."""
@@ -185,6 +193,23 @@ class Readiness:
             for command, params in sorted(_REQUIRED_REQUESTS, key=lambda call: self._commands.sent_at(*call)):
                 calls += self._commands.call(now, command, params)
             # Repeated by ``Commands`` after 15 s: an autopilot that restarted elsewhere has another origin.
-            origin = (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            calls += self._commands.call(now, mavlink.MAV_CMD_REQUEST_MESSAGE, origin)
+            calls += self._commands.call(now, *_ORIGIN_CALL)
         return calls + self.limits.step(now)
+
+    def confirm_origin(self, now: int, view: View) -> list[Message]:
+        """Return the request for the origin in flight, if it is due.
+
+        It is due every 10 s, because the message about a new origin may be lost, and at once after a change
+        of the origin, because the message may have been an old one.
+        """
+        if view.local is not self._local:
+            # Before the flight the origin was requested all the time.
+            self._confirm_at = now + (_ORIGIN_US if self._local is None else 0)
+            self._local = view.local
+        if now < self._confirm_at or not self._vehicle.alive:
+            return []
+        self._confirm_at = now + _ORIGIN_US
+        # Whether it is acknowledged makes no difference: the next request is as good as a repetition.
+        command, params = _ORIGIN_CALL
+        target = self._commands.own.system, mavlink.MAV_COMP_ID_AUTOPILOT1
+        return [CommandLong(self._commands.own, *target, command, 0, params)]

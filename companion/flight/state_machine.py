@@ -275,6 +275,8 @@ class Pilot:
         """Return the commands to send at ``now`` (µs)."""
         self.vehicle.tick(now)
         commands = self._act(now, view)
+        if self.phase in STEERED:
+            commands += self._readiness.confirm_origin(now, view)
         connected = self.phase is not Phase.CONNECT or self._readiness.received
         return [*commands, *self._readiness.wishes(now)] if connected else commands
 

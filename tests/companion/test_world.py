@@ -186,6 +186,27 @@ def test_an_origin_from_before_that_comes_late_or_again_changes_nothing(late, bo
         assert picture.at(NOW).local is frame
 
 
+@LAWS
+@given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 2_000_000)), max_size=8))
+def test_a_late_copy_of_an_earlier_origin_changes_nothing_though_none_has_a_time(late):
+    picture = world(*(("autopilot", origin_at(k, 0)) for k in range(6)))
+    frame = picture.at(NOW).local
+    for step, later in late:
+        picture.receive(NOW + later, "autopilot", origin_at(step, 0))
+        assert picture.at(NOW).local is frame
+    picture.receive(NOW + 2_000_001, "autopilot", origin_at(0, 0))
+    assert picture.at(NOW).local is not frame
+
+
+def test_an_origin_without_a_time_makes_no_earlier_stamp_new():
+    picture = world(
+        ("autopilot", origin_at(0, 7)), ("autopilot", origin_at(1, 9)), ("autopilot", origin_at(2, 0))
+    )
+    frame = picture.at(NOW).local
+    picture.receive(NOW, "autopilot", origin_at(0, 7))
+    assert picture.at(NOW).local is frame
+
+
 @pytest.mark.parametrize("time", [0, 7])
 def test_an_autopilot_that_began_anew_or_says_no_time_has_the_origin_that_it_says(time):
     picture = world(("autopilot", origin_at(1, 10**9)))

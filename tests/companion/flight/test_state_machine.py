@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from tests.companion.flight.rig import (
     HEALTHY,
     HEIGHT,
     ILL,
+    IN_FLIGHT,
     NOTHING,
     OWN,
     READY,
@@ -371,7 +373,8 @@ def test_settling_ends():
     rig.pilot.land()
     longest = CompanionConfig().guard.settle_us * 1e-6
     flying = beat("ardupilot", armed=True, guided=True)
-    assert rig.run(longest - 0.1, flying) == []
+    sent = rig.run(longest - 0.1, flying)
+    assert {(command, params[0]) for command, params in sent} == {ORIGIN_REQUEST}
     assert [command for command, _ in rig.run(0.2, flying)] == [mavlink.MAV_CMD_NAV_LAND]
 
 
@@ -503,3 +506,28 @@ def test_plans_begin_when_the_mode_is_taken_and_end_when_no_heartbeat_shows_it(t
     assert not rig.pilot.guided
     assert rig.pilot.steers(rig.now) is taken
     assert not rig.pilot.steers(rig.now + 2_000_000)
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("acks", [False, True])
+def test_the_origin_is_asked_for_in_flight_every_ten_seconds_and_at_once_when_it_changes(flavour, acks):
+    """The message about a new one may be lost, and one that came may have been an old copy."""
+    rig = Rig(flavour).escorting()
+    rig.run(1.0, beat(flavour, armed=True, guided=True), IN_FLIGHT, acks=acks)
+    rig.sent.clear()
+    rig.run(60.0, beat(flavour, armed=True, guided=True), IN_FLIGHT, acks=acks)
+    asked = [at for at, command, params in rig.sent if (command, params[0]) == ORIGIN_REQUEST]
+    assert len(asked) == 6
+    assert {b - a for a, b in pairwise(asked)} == {10_000_000}
+    rig.view = rig.view._replace(local=FLEET.local(FLEET.latitude + 1e-5, FLEET.longitude, FLEET.altitude))
+    sent = rig.tick(beat(flavour, armed=True, guided=True), IN_FLIGHT)
+    assert ORIGIN_REQUEST in {(command, params[0]) for command, params in sent}
+
+
+def test_nothing_is_asked_of_a_vehicle_that_another_controller_flies():
+    rig = Rig("px4").escorting()
+    rig.run(1.0, beat("px4", armed=True, guided=True), IN_FLIGHT)
+    rig.run(0.1, beat("px4", armed=True, mode=3 << 16), IN_FLIGHT)
+    assert rig.pilot.phase is Phase.YIELDED
+    sent = rig.run(30.0, beat("px4", armed=True, mode=3 << 16), IN_FLIGHT)
+    assert ORIGIN_REQUEST not in {(command, params[0]) for command, params in sent}
