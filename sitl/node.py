@@ -71,6 +71,7 @@ LINK: Final = "autopilot"
 # Message ids; the services add their own.
 _RECEIVED: Final = frozenset(
     (
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
         mavlink.MAVLINK_MSG_ID_PING,
         mavlink.MAVLINK_MSG_ID_SET_MODE,
         mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
@@ -85,8 +86,11 @@ _RECEIVED: Final = frozenset(
 )
 _TRUTH: Final[int] = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 _SHOWN_US: Final = 50_000
-# Limit of messages in answer to one datagram; the rest of the datagram is ignored.
-_MAX_ANSWERS: Final = 32
+# With more answers than this in a step, telemetry is sent before them.
+_MANY_ANSWERS: Final = 32
+# Limit of messages in answer to one datagram. A datagram that fits an Ethernet frame cannot exceed it: the
+# shortest request takes 13 of 1500 bytes.
+_MAX_ANSWERS: Final = 256
 _TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
 _FIRMWARE: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
 
@@ -125,7 +129,7 @@ class Autopilot:
         self.config = config = self._values.configured(config)
         self._source = source = Source(config.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._outbox: list[Message] = []
-        reporter = StatusReporter(source, self._outbox)
+        self._status_text = reporter = StatusReporter(source, self._outbox)
         self._firmware: Firmware = _FIRMWARE[config.flavour](config)
         self._origin = Origin(site, config.latitude, config.longitude, config.altitude)
         self._navigation = navigation = Navigation(config, self._firmware, self._origin, saved)
@@ -313,9 +317,12 @@ class Autopilot:
         if datagram.link != LINK:
             return
         enough = len(self._outbox) + _MAX_ANSWERS
-        for message in self._codec.feed(datagram.data, whole=True):
+        messages = self._codec.feed(datagram.data, whole=True)
+        for number, message in enumerate(messages):
             if len(self._outbox) >= enough:
                 # Answers go to all receivers: excessive requests of one sender would crowd out the others.
+                left = len(messages) - number
+                self._status_text.complain(f"Requests refused: {left} of one datagram", self._now)
                 break
             if self.camera is not None and isinstance(message, CommandLong | CommandInt):
                 self._outbox += self._camera_service.handle(message, self._clock.stamp(self._now))
@@ -336,7 +343,7 @@ class Autopilot:
         if self._now >= self._telemetry.next_due:
             reported = self._telemetry.collect(self._now, self._snapshots.read(self._now))
             # If there are many answers, the messages sent first are more likely to fit the link.
-            messages = reported + messages if len(messages) > _MAX_ANSWERS else messages + reported
+            messages = reported + messages if len(messages) > _MANY_ANSWERS else messages + reported
         seen = [] if self.camera is None else self.camera.messages(self._now, self._boot or 0)
         if not messages and not seen:
             return []

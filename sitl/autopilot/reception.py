@@ -13,6 +13,7 @@ from mavlink_bridge.messages import (
     CommandLong,
     FollowTarget,
     GlobalPosition,
+    Heartbeat,
     Message,
     Ping,
     SetMode,
@@ -66,6 +67,7 @@ class Reception:
         self._services = services
         self._set_mode_ack = set_mode_ack
         self._stamp = stamp
+        self._autopilots: set[Source] = set()
 
     def handle(self, message: Message, now: int, estimate: Estimate) -> None:
         """Handle a message that arrived at ``now`` (µs since boot), with the ``estimate`` of that time."""
@@ -79,7 +81,9 @@ class Reception:
             case FollowTarget() | GlobalPosition():
                 if self._commander.follows and message.source.system != self._source.system:
                     self._following.receive(message, estimate.pose, now)
-            case Timesync(tc1=0) if message.source.component == self._source.component:
+            case Heartbeat():
+                self._note(message)
+            case Timesync(tc1=0) if message.source in self._autopilots:
                 # Other autopilots on a shared link ask at 10 Hz; each would answer each of them.
                 pass
             case Timesync(tc1=0):
@@ -93,6 +97,15 @@ class Reception:
                     self._change_mode(message, now)
             case _:
                 self._serve(message, now)
+
+    def _note(self, heartbeat: Heartbeat) -> None:
+        """Note whether the sender is an autopilot; a client may use an autopilot's component id as well."""
+        if heartbeat.source.component != self._source.component:
+            return
+        if heartbeat.autopilot == mavlink.MAV_AUTOPILOT_INVALID:
+            self._autopilots.discard(heartbeat.source)
+        else:
+            self._autopilots.add(heartbeat.source)
 
     def _steer(
         self, message: SetpointLocal | SetpointGlobal | SetpointAttitude, now: int, estimate: Estimate

@@ -106,11 +106,22 @@ def test_nothing_of_a_flood_is_kept(kind: str) -> None:
     assert rig.autopilot._outbox == []
 
 
-def test_what_one_datagram_asks_beyond_measure_is_not_answered_and_in_nobodys_way() -> None:
+def test_what_one_datagram_asks_beyond_measure_is_refused_visibly_and_in_nobodys_way() -> None:
     rig = Rig(start_height=5.0)
     (sent,) = flood(rig, [], 0.005, b"".join(crowd(900, ("pings",))), ASK)
-    assert len(received(sent, m.Ping)) == 32
+    assert len(received(sent, m.Ping)) == 256
+    assert [text.text for text in received(sent, m.StatusText)] == ["Requests refused: 644 of one datagram"]
     assert len(received(sent, CommandAck)) == 1
+
+
+@pytest.mark.parametrize("kind", ["pings", "unknown commands"])
+def test_each_request_of_a_datagram_that_fits_an_ethernet_frame_is_answered(kind: str) -> None:
+    rig, pieces, count = Rig(start_height=5.0), crowd(200, (kind,)), 0
+    while sum(map(len, pieces[: count + 1])) <= 1472:
+        count += 1
+    assert count > 32
+    (sent,) = flood(rig, [], 0.005, b"".join(pieces[:count]))
+    assert len(received(sent, {"pings": m.Ping, "unknown commands": CommandAck}[kind])) == count
 
 
 def test_complaints_are_told_of_some_and_not_of_thousands() -> None:

@@ -170,6 +170,16 @@ def test_timesync_and_ping_are_answered():
     assert len(rig.all(Timesync)) == len(rig.all(Ping)) == 1
 
 
+def test_timesync_of_a_client_with_an_autopilots_component_is_answered_and_an_autopilots_is_not():
+    """Ten PX4s on one link ask a hundred times a second; a client may have any component."""
+    rig, client, other = Rig(), Source(255, 1), Source(12, 1)
+    rig.run(1.0)
+    rig.step(Heartbeat(client, 6, 8, 0, 0, 4), Heartbeat(other, 2, 12, 0, 0, 4))
+    for k, source in enumerate((client, other, Source(254, 1), Source(12, 195))):
+        rig.step(Timesync(source, 0, 1 + k))
+    assert [message.ts1 for message in rig.all(Timesync)] == [1, 3, 4]
+
+
 @settings(max_examples=60, deadline=None)
 @given(chunks=st.lists(st.binary(max_size=300), max_size=8))
 def test_garbage_is_ignored(chunks):
