@@ -304,7 +304,8 @@ class Pilot:
         """Return the landing command until it takes effect; after the landing, what ``_leave`` returns.
 
         The vehicle has landed when its autopilot has said for ``_LANDED_US``, and nothing else, that it is
-        disarmed and on the ground: a single message may be another sender's.
+        disarmed and on the ground: a single message may be another sender's. Without any report of the landed
+        state it must be disarmed for 10 s (``Vehicle.rested_for``).
         The command is not repeated after it took effect: if the autopilot then leaves its landing mode,
         another controller has ordered that. The command is not sent while the autopilot is silent, because a
         pilot may have the vehicle.

@@ -22,6 +22,8 @@ from mavlink_bridge.messages import (
 
 HEARTBEAT_LOST = 3_000_000
 """µs without a heartbeat after which the autopilot's mode is unknown."""
+_UNREPORTED_US = 7_500_000
+"""µs for which a vehicle must be disarmed in addition if its autopilot never reports EXTENDED_SYS_STATE."""
 _MAX_TEXTS = 16
 _CRUISING = (mavlink.MAV_LANDED_STATE_IN_AIR, mavlink.MAV_LANDED_STATE_UNDEFINED)
 
@@ -78,7 +80,7 @@ class Vehicle:
         if self._extended is not self._dated_extended:
             self._dated_extended, self._extended_at = self._extended, now
         beat, extended = self.heartbeat, self._extended
-        grounded = extended is not None and extended.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
+        grounded = extended is None or extended.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
         rests = beat is not None and not self.armed and grounded
         if not rests or self._contradicted:
             self._rested_at = None
@@ -90,10 +92,14 @@ class Vehicle:
     def rested_for(self) -> int:
         """Time (µs) for which all messages have said that the vehicle is disarmed and on the ground.
 
-        It is 0 while one of the two is unknown. One message that says otherwise begins it anew: another
+        It is 0 while one of the two is unknown, except for an autopilot that never reports a landed state:
+        then being disarmed counts, but not in the first ``_UNREPORTED_US``. One message that says otherwise begins it anew: another
         sender may use the autopilot's ids. An autopilot that has fallen silent says nothing else.
         """
-        return 0 if self._rested_at is None else self.now - self._rested_at
+        if self._rested_at is None:
+            return 0
+        rested = self.now - self._rested_at
+        return rested if self._extended is not None else max(0, rested - _UNREPORTED_US)
 
     @property
     def beat_at(self) -> int:

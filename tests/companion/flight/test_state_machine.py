@@ -331,6 +331,24 @@ def test_a_vehicle_of_unknown_landed_state_has_not_landed(flavour):
     assert rig.pilot.phase is Phase.LAND
 
 
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_vehicle_that_never_tells_its_landed_state_has_landed_when_it_is_disarmed_for_ten_seconds(flavour):
+    rig = Rig(flavour).escorting()
+    rig.pilot.land()
+    rig.pilot.settled()
+    mode = PROFILES[flavour].hold_mode
+    rig.run(3.0, beat(flavour, armed=True, guided=True))
+    for _ in range(4):
+        # A heartbeat in a stranger's name, and the autopilot's own, which contradicts it.
+        rig.run(9.0, beat(flavour, mode=mode))
+        rig.run(0.1, beat(flavour, armed=True, mode=min(PROFILES[flavour].land_modes)))
+        assert rig.pilot.phase is Phase.LAND
+    rig.run(9.8, beat(flavour, mode=mode))
+    assert rig.pilot.phase is Phase.LAND
+    rig.run(0.5, beat(flavour, mode=mode))
+    assert rig.pilot.phase is Phase.DONE
+
+
 def test_a_px4_that_falls_silent_when_it_has_landed_is_not_waited_for():
     rig = down("px4")
     rig.run(0.1, beat("px4", mode=OFFBOARD), landed(1))
