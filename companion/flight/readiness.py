@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence, Set
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -42,6 +42,17 @@ HEALTH = 500_000
 
 A start does not require them: a vehicle may have neither.
 """
+SLOW_STREAMS: Mapping[int, int] = MappingProxyType(
+    {
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 250_000,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE: 250_000,
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1_000_000,
+        mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1_000_000,
+    }
+)
+"""The same as ``STREAMS`` for who only looks on: enough for planning, and little for a radio."""
+SLOW_HEALTH = 1_000_000
+"""The same as ``HEALTH`` for who only looks on."""
 
 UTC = 1_000_000
 """Interval (µs) of SYSTEM_TIME, which is requested where it is a source of fleet time."""
@@ -59,19 +70,26 @@ def _interval(message: int, interval: int) -> tuple[int, Params]:
 
 
 @lru_cache
-def _optional_requests(estimator_message: int, utc: bool) -> tuple[tuple[int, Params], ...]:
+def _optional_requests(estimator_message: int, health: int, utc: bool) -> tuple[tuple[int, Params], ...]:
     messages = mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, estimator_message
-    quality = [_interval(message, HEALTH) for message in messages]
+    quality = [_interval(message, health) for message in messages]
     return (*quality, *([_interval(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, UTC)] if utc else ()))
 
 
-_REQUIRED_REQUESTS = tuple(_interval(message, interval) for message, interval in STREAMS.items())
-
-
 class Readiness:
-    """Readiness of one ``vehicle``; ``calls``: the protocol that sends commands to its autopilot."""
+    """Readiness of one ``vehicle``; ``calls``: the protocol that sends commands to its autopilot.
 
-    def __init__(self, config: CompanionConfig, vehicle: Vehicle, calls: Commands) -> None:
+    ``slow``: the messages are requested at the rates of ``SLOW_STREAMS``. ``arriving``: ids of messages that
+    arrive already, whose rate is left as it is; a caller that wants all of its own rates leaves it empty.
+    """
+
+    def __init__(
+        self, config: CompanionConfig, vehicle: Vehicle, calls: Commands, *, slow: bool = False
+    ) -> None:
+        streams = SLOW_STREAMS if slow else STREAMS
+        self._required = tuple(_interval(message, interval) for message, interval in streams.items())
+        self._health = SLOW_HEALTH if slow else HEALTH
+        self.arriving: Set[int] = frozenset()
         self._config = config
         self._vehicle = vehicle
         self._commands = calls
@@ -97,7 +115,11 @@ class Readiness:
     @property
     def received(self) -> bool:
         """Whether the autopilot has accepted or refused the request for each required message."""
-        return all(self._commands.answered(*call) for call in _REQUIRED_REQUESTS)
+        return all(self._commands.answered(*call) for call in self._wanted(self._required))
+
+    def _wanted(self, calls: Sequence[tuple[int, Params]]) -> list[tuple[int, Params]]:
+        """Return the requests without those for messages that are ``arriving``."""
+        return [call for call in calls if int(call[1][0]) not in self.arriving]
 
     def wishes(self, now: int) -> list[Message]:
         """Return the next request for the messages about position quality and time, if one is due.
@@ -108,10 +130,11 @@ class Readiness:
         profile = self._vehicle.profile
         if profile is None or profile is self._fulfilled or not self._vehicle.alive:
             return []
-        for call in _optional_requests(profile.estimator_message, self._utc):
+        for call in self._wanted(_optional_requests(profile.estimator_message, self._health, self._utc)):
             if not self._requests.answered(*call):
                 return self._requests.call(now, *call)
-        self._fulfilled = profile
+        if not self.arriving:
+            self._fulfilled = profile
         return []
 
     def unseen(self, view: View) -> str:
@@ -190,7 +213,9 @@ class Readiness:
             # If another controller sends set-points, the checks pass and the mode is not changed.
             calls += self._commands.call(now, mavlink.MAV_CMD_DO_SET_MODE, profile.hold_call)
         if self._vehicle.heartbeat is not None:
-            for command, params in sorted(_REQUIRED_REQUESTS, key=lambda call: self._commands.sent_at(*call)):
+            for command, params in sorted(
+                self._wanted(self._required), key=lambda call: self._commands.sent_at(*call)
+            ):
                 calls += self._commands.call(now, command, params)
             # Repeated by ``Commands`` after 15 s: an autopilot that restarted elsewhere has another origin.
             calls += self._commands.call(now, *_ORIGIN_CALL)

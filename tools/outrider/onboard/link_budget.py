@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.config.target_source import FusedSource
-from companion.flight.readiness import HEALTH, STREAMS
+from companion.flight.readiness import HEALTH, SLOW_HEALTH, SLOW_STREAMS, STREAMS
 from companion.telemetry.sharing import forwarded, onboard_heartbeat
 from mavlink_bridge.links.endpoints import BAUD_RATES, Endpoint, Serial
 from mavlink_bridge.messages import (
@@ -171,15 +171,22 @@ def doubts(endpoint: Endpoint, config: CompanionConfig, signed: bool) -> str:
 
 
 def steered(config: CompanionConfig, signed: bool) -> float:
-    """Return the bytes per second of set-points and heartbeats to an autopilot under control."""
+    """Return the bytes per second of set-points and heartbeats to an autopilot under control.
+
+    Beside them the companion asks for the origin every 10 s, which is not counted: 4 bytes/s.
+    """
     setpoints = _size(_SETPOINT, signed) * _SECOND / config.rates.setpoint_us
     return setpoints + _size(_BEAT, signed)
 
 
-def reported(signed: bool) -> float:
-    """Return the bytes per second that an autopilot sends: requested streams and its heartbeat."""
-    streams = sum(_size(_TOLD[number], signed) * _SECOND / each for number, each in STREAMS.items())
-    health = sum(_size(message, signed) for message in _HEALTH) * _SECOND / HEALTH
+def reported(signed: bool, *, slow: bool = False) -> float:
+    """Return the bytes per second that an autopilot sends: requested streams and its heartbeat.
+
+    ``slow``: as a dry run requests them.
+    """
+    intervals, health_us = (SLOW_STREAMS, SLOW_HEALTH) if slow else (STREAMS, HEALTH)
+    streams = sum(_size(_TOLD[number], signed) * _SECOND / each for number, each in intervals.items())
+    health = sum(_size(message, signed) for message in _HEALTH) * _SECOND / health_us
     return streams + health + _size(_BEAT, signed)
 
 
@@ -191,7 +198,7 @@ def doubts_of_autopilot(endpoint: Endpoint, config: CompanionConfig, signed: boo
     """
     if not isinstance(endpoint, Serial) or _USB in endpoint.device:
         return ""
-    to, back = 0.0 if dry_run else steered(config, signed), reported(signed)
+    to, back = 0.0 if dry_run else steered(config, signed), reported(signed, slow=dry_run)
     need = 2.0 * back if dry_run else to + back
     if need <= room(endpoint.baud):
         return ""
