@@ -112,7 +112,9 @@ class GuardConfig(Settings):
 class RatesConfig(Settings):
     """Periods of the companion's activities, µs."""
 
-    replan_us: Micros = Field(10_000, description="µs between plans")
+    replan_us: Micros = Field(
+        10_000, description="µs between plans; with the field, more than 50000 in a file gives a warning"
+    )
     setpoint_us: Micros = Field(20_000, description="µs between set-points")
     state_us: Micros = Field(100_000, description="µs between messages of the own state to the others")
     plan_us: Micros = Field(100_000, description="µs between messages of the own plan to the others")

@@ -93,8 +93,9 @@ class Vehicle:
         """Time (µs) for which all messages have said that the vehicle is disarmed and on the ground.
 
         It is 0 while one of the two is unknown, except for an autopilot that never reports a landed state:
-        then being disarmed counts, but not in the first ``_UNREPORTED_US``. One message that says otherwise begins it anew: another
-        sender may use the autopilot's ids. An autopilot that has fallen silent says nothing else.
+        then being disarmed counts, but not in the first ``_UNREPORTED_US``. One message that says otherwise
+        begins it anew: another sender may use the autopilot's ids. An autopilot that has fallen silent says
+        nothing else.
         """
         if self._rested_at is None:
             return 0

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+import yaml
 
 import outrider
 from outrider.errors import InputError, OutriderError
@@ -263,6 +264,15 @@ def test_a_goal_that_is_not_reached_ends_with_1_and_a_table(run: Run, tmp_path: 
     assert [path.name for path in (tmp_path / "runs").iterdir()] == [
         "antipodal-8-tangential-planar-replan10-seed3"
     ]
+
+
+def test_plans_that_are_far_apart_in_a_file_are_warned_of(run: Run, tmp_path: Path) -> None:
+    text = ANTIPODAL.replace("vehicles: 8", "vehicles: 1\ncap_s: 1")
+    document = yaml.safe_load(text)
+    document["companion"] = {**document.get("companion", {}), "rates": {"replan_us": 100_000}}
+    (tmp_path / "my.yaml").write_text(yaml.safe_dump(document))
+    (said,) = run("swarm", "my.yaml").err.splitlines()
+    assert "100000 µs between plans" in said
 
 
 # Conventions

@@ -47,3 +47,18 @@ def test_a_fleet_file_of_another_fleet_is_refused_before_anything_moves(tmp_path
     with pytest.raises(InputError, match=r"companion\.field\.position_sigma: is 0\.3, and 0\.0 in") as caught:
         checked(Options(AUTOPILOT, str(own), SWARM, system=7))
     assert "lacks the own system id 7" in str(caught.value)
+
+
+@pytest.mark.parametrize("dry_run", [False, True])
+@pytest.mark.parametrize(("period", "warned"), [(20_000, False), (50_000, False), (50_004, True)])
+def test_plans_that_are_far_apart_are_warned_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], period: int, warned: bool, dry_run: bool
+) -> None:
+    document = yaml.safe_load(find("companions", "px4").read_text(encoding="utf-8"))
+    document["companion"]["rates"]["replan_us"] = period
+    own = tmp_path / "own.yaml"
+    own.write_text(yaml.safe_dump(document), encoding="utf-8")
+    checked(Options(AUTOPILOT, str(own), SWARM, system=7, dry_run=dry_run))
+    said = [line for line in capsys.readouterr().err.splitlines() if "replan_us" in line]
+    assert len(said) == warned
+    assert all(f"{period} µs" in line and "at most 50000" in line for line in said)

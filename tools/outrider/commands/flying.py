@@ -71,6 +71,7 @@ def swarm(
     from outrider.report.command import NAME, make, write
     from outrider.runs.summary import exit_status
     from outrider.scenarios.options import Options, named
+    from outrider.scenarios.replanning import doubts_of_plans
     from outrider.simulation.console import progress, show
     from outrider.simulation.preparation import prepare
     from outrider.swarm import command as flying
@@ -94,6 +95,9 @@ def swarm(
         wrong = f"is {processes} with --real-time, which has a process per node; allowed: one of the two"
         raise InputError(Fault("--processes", wrong))
     prepared = prepare(scenario, options)
+    doubt = doubts_of_plans(prepared.scenario.companion)
+    if doubt and replan_hz is None:
+        sys.stderr.write(f"outrider swarm: {doubt}\n")
     with ExitStack() as open_:
         shown = None
         if view:

@@ -17,6 +17,7 @@ from outrider.onboard.link_budget import doubts, doubts_of_autopilot
 from outrider.resources import find
 from outrider.scenarios.fleet_file import with_fleet_file
 from outrider.scenarios.fly_config import FlyConfig
+from outrider.scenarios.replanning import doubts_of_plans
 from outrider.yaml_files.yaml_file import load
 
 
@@ -122,6 +123,7 @@ def checked(options: Options) -> Request:
     for doubt in (
         doubts(swarm, config.settings, signed),
         doubts_of_autopilot(endpoints["autopilot"], config.settings, signed, dry_run=options.dry_run),
+        doubts_of_plans(config.settings),
     ):
         if doubt:
             sys.stderr.write(f"outrider fly: {doubt}\n")
