@@ -93,10 +93,10 @@ class Companion:
         self._planning = Planning(config, world, pilot, self._goals, self.avoidance)
         self._setpoints = Setpoints(config, own, pilot, self.avoidance, self._planning)
         self._sharing = Sharing(config, own, fleet)
-        self._round_trips = RoundTrips(own)
+        self.round_trips = RoundTrips(own)
         self.reporter = StatusReporter(config.ground_messages, own)
         self._checks = HealthChecks(
-            config, world, pilot, self.avoidance, self._round_trips, self.reporter, self._fleet_clock
+            config, world, pilot, self.avoidance, self.round_trips, self.reporter, self._fleet_clock
         )
         self.health = self._checks.monitor
         self._reports_on = config.ground_messages.texts or config.ground_messages.values
@@ -180,7 +180,7 @@ class Companion:
         self.pilot.column_waits = self.avoidance.wait(now)
         commands = self.pilot.step(now, view)
         self.world.doubt = self.pilot.vehicle.positioning.radius + self.avoidance.tracking.excess
-        requests: list[Message] = [*self._round_trips.due(now, self.world.late)]
+        requests: list[Message] = [*self.round_trips.due(now, self.world.late)]
         if self._fleet_clock is not None:
             requests += self._fleet_clock.requests(now)
         self._checks.step(now, view, late=now - self._setpoints.next_due)
@@ -241,7 +241,7 @@ class Companion:
             self._fleet_clock.receive(now, "autopilot", message)
         if isinstance(message, SystemTime):
             return
-        answer = self._round_trips.receive(message)
+        answer = self.round_trips.receive(message)
         if answer is not None:
             self.world.answered(now, answer)
 

@@ -3,7 +3,8 @@
 Messages with growing delay indicate either a slow link or a slow clock; one-way messages cannot distinguish
 the two. A request and its response can: the autopilot's clock showed the returned time after the request was
 sent. So its offset is known to within the time that the request took, regardless of how long the response
-took (``SenderClock.answered``). No requests are sent while messages arrive as expected.
+took (``SenderClock.answered``). No requests are sent while messages arrive as expected, unless ``always`` is
+set, as long as it is not known whether the autopilot's clock is a simulation's.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ The last three digits of a request's time (ns) are its sender's component id: th
 _LATE_US = 20_000
 """Requests are sent if ``late`` is larger, the delay of the fastest of the last few messages."""
 _PERIOD_US = 200_000
-"""Time between two requests."""
+"""Time between two requests while messages are late."""
+_UNHURRIED_US = 1_000_000
+"""Time between two requests otherwise."""
 _MAX_OPEN_REQUESTS = 32
 """Maximum number of requests whose response is awaited."""
 _RESPONSE_TIMEOUT_US = 3_000_000
@@ -36,10 +39,18 @@ class Answer(NamedTuple):
 
 
 class RoundTrips:
-    """TIMESYNC exchange between the companion ``own`` and the autopilot of its system."""
+    """TIMESYNC exchange between the companion ``own`` and the autopilot of its system.
+
+    ``always``: requests are sent although messages arrive as expected.
+    """
 
     def __init__(self, own: Source) -> None:
         self._own = own
+        self.always = False
+        self.requested = 0
+        """Own time (µs) of the last request; 0 before the first."""
+        self.last: Answer | None = None
+        """The last answer."""
         self._next = 0
         self._asked: deque[int] = deque(maxlen=_MAX_OPEN_REQUESTS)
         self._since: int | None = None
@@ -48,11 +59,14 @@ class RoundTrips:
         """Return the request due at ``now`` (µs), if any; ``late`` (µs): ``SenderClock.late``."""
         if late <= _LATE_US:
             self._since = None
-            return []
+            if not self.always:
+                return []
         if now < self._next:
             return []
-        self._next = now + _PERIOD_US
-        self._since = now if self._since is None else self._since
+        self._next = now + (_PERIOD_US if late > _LATE_US else _UNHURRIED_US)
+        self.requested = now
+        if late > _LATE_US:
+            self._since = now if self._since is None else self._since
         question = now * _NS_PER_US + self._own.component
         self._asked.append(question)
         return [Timesync(self._own, 0, question)]
@@ -63,7 +77,8 @@ class RoundTrips:
             return None
         self._asked.remove(message.ts1)
         self._since = None
-        return Answer(message.ts1 // _NS_PER_US, message.tc1 // _NS_PER_US)
+        self.last = Answer(message.ts1 // _NS_PER_US, message.tc1 // _NS_PER_US)
+        return self.last
 
     def unanswered(self, now: int) -> bool:
         """Return whether requests are being sent and have had no response for ``_RESPONSE_TIMEOUT_US``."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
 from threading import Lock
 from typing import Final, NamedTuple
 
@@ -40,12 +40,19 @@ _MIN_EVIDENCE_US, _MIN_UNCLEAR_EVIDENCE_US = 10_000_000, 30_000_000
 """Wall time after which the kind of clock is decided.
 
 The second is for a rate error between ``_MAX_REAL_RATE_ERROR`` and ``_MIN_SIMULATED_RATE_ERROR``: a
-simulation on a busy machine, or a growing queue. No queue grows evenly for 30 s.
+simulation on a busy machine, or a growing queue. Round trips tell the two apart; without them it is assumed
+that no queue grows evenly for 30 s.
 """
 _MAX_REAL_RATE_ERROR, _MIN_SIMULATED_RATE_ERROR = 0.005, 0.2
 """Limits of |rate − 1|: up to the first the clock is real, above the second it is a simulation's."""
 _MAX_UNEVENNESS: Final = 0.125
 """Limit for even evidence: largest spread of the stamps about the line, as a share of |rate − 1| · span."""
+_MAX_TRIPS: Final = 128
+"""Number of round trips kept."""
+_MIN_TRIPS_SHARE: Final = 0.5
+"""Share of the time of the evidence that round trips must cover to count."""
+_TRIPS_TOLERANCE: Final = 0.001
+"""Rate error that a real clock may have where round trips exclude more."""
 _SLEW_RATE: Final = 0.5
 """Share of the rate with which a clock that is ahead of the line continues until the line reaches it."""
 _JUMP_CONFIRMATIONS: Final = 5
@@ -61,6 +68,14 @@ class _Seen(NamedTuple):
     stamp: int
 
 
+class _Trip(NamedTuple):
+    """The followed clock showed ``stamp`` (µs) between ``asked`` and ``received`` (µs of wall time)."""
+
+    asked: int
+    received: int
+    stamp: int
+
+
 class FollowedClock:
     """``Clock`` that begins at ``begin`` (µs), follows the stamps of another clock, and never goes back.
 
@@ -70,7 +85,9 @@ class FollowedClock:
     its rate relative to ``clock``. One thread may feed it while others read it.
 
     ``simulated``: whether the stamps are a simulation's. None: this is decided after ten to thirty seconds of
-    stamps; if they are not a simulation's, the clock then runs as ``clock`` does.
+    stamps; if they are not a simulation's, the clock then runs as ``clock`` does. Stamps alone cannot tell a
+    slow clock from a delay that grows evenly; with round trips (``answered``) a delay is never taken for a
+    rate.
     """
 
     def __init__(self, clock: Clock, begin: int = 0, *, simulated: bool | None = True) -> None:
@@ -87,6 +104,7 @@ class FollowedClock:
         self._known = False
         self._verdict = simulated
         self._evidence: list[_Seen] = []
+        self._trips: deque[_Trip] = deque(maxlen=_MAX_TRIPS)
         self.rate = 1.0
         self.steps = 0
         self.judged: float | None = None
@@ -122,12 +140,22 @@ class FollowedClock:
                     if abs(ahead) > _JUMP_US * max(1.0, self.rate):
                         self.steps += 1
                         self._evidence.clear()
+                        self._trips.clear()
                     # Evidence before a smaller jump is kept. A varying delay looks like repeated small jumps;
                     # if they cleared the evidence, the kind of clock would never be decided.
                     self._restart(wall, stamp)
                 return
             self._deviating = 0
             self._gather(_Seen(wall, stamp))
+
+    def answered(self, asked: int, received: int, stamp: int) -> None:
+        """Record that the sender's clock showed ``stamp`` between ``asked`` and ``received``.
+
+        ``stamp`` (µs, sender's clock) comes from the answer to a request; the others are µs of ``clock``.
+        """
+        with self._lock:
+            if self._verdict is None and asked <= received:
+                self._trips.append(_Trip(asked, received, stamp))
 
     @property
     def known(self) -> bool:
@@ -161,10 +189,10 @@ class FollowedClock:
         if _MAX_REAL_RATE_ERROR < off <= _MIN_SIMULATED_RATE_ERROR and span < _MIN_UNCLEAR_EVIDENCE_US:
             return
         self.judged = rate
-        self._verdict = off > _MIN_SIMULATED_RATE_ERROR or (
-            off > _MAX_REAL_RATE_ERROR and _even(evidence, rate)
-        )
+        seems = off > _MIN_SIMULATED_RATE_ERROR or (off > _MAX_REAL_RATE_ERROR and _even(evidence, rate))
+        self._verdict = seems and not _may_be_real(self._trips, span)
         evidence.clear()
+        self._trips.clear()
         if not self._verdict:
             shown = float(self._read(wall))
             self._wall, self._shown, self._surplus, self.rate = wall, shown, 0.0, 1.0
@@ -226,6 +254,23 @@ def _even(pieces: Sequence[_Seen], rate: float) -> bool:
     """Return whether all ``pieces`` lie near one line of slope ``rate``, relative to |rate − 1| · span."""
     off = [piece.stamp - rate * (piece.wall - pieces[0].wall) for piece in pieces]
     return max(off) - min(off) <= _MAX_UNEVENNESS * abs(rate - 1.0) * (pieces[-1].wall - pieces[0].wall)
+
+
+def _may_be_real(trips: Sequence[_Trip], span: int) -> bool:
+    """Return whether the ``trips`` cover enough of ``span`` (µs), and allow a clock of the rate 1.
+
+    Between a trip and a later one the clock advanced by the difference of the stamps, in no more time than
+    from the first request to the second answer, and in no less than from the first answer to the second
+    request. This holds whatever the delays of both ways are.
+    """
+    if len(trips) < 2 or trips[-1].asked - trips[0].received < _MIN_TRIPS_SHARE * span:
+        return False
+    for first, second in combinations(trips, 2):
+        shown = second.stamp - first.stamp
+        most, least = second.received - first.asked, max(second.asked - first.received, 0)
+        if not (1.0 - _TRIPS_TOLERANCE) * least <= shown <= (1.0 + _TRIPS_TOLERANCE) * most:
+            return False
+    return True
 
 
 def _slope_above(pieces: Sequence[_Seen]) -> float:

@@ -160,6 +160,54 @@ def test_a_queue_that_grows_before_anybody_decides_is_no_simulation(growth, end)
     assert not clock.simulated
 
 
+def decided(rate, there, back, *, asked=True):
+    """A clock that has followed one of this ``rate`` for 45 s: stamps, at 50 Hz, and answers, five times a
+    second, come ``back(t)`` s after they left, and requests reach it after ``there(t)`` s."""
+    wall = SimulatedClock(SECOND)
+    clock = FollowedClock(wall, simulated=None)
+    began = sent = request = SECOND
+    under_way = []
+    while wall.now() < began + 45 * SECOND:
+        now = wall.now()
+        while sent <= now:
+            arrives = sent + round(back((sent - began) * 1e-6) * SECOND)
+            under_way.append((arrives, round(rate * sent), None))
+            sent += 20_000
+        if asked and request <= now:
+            reached = now + round(there((now - began) * 1e-6) * SECOND)
+            arrives = reached + round(back((reached - began) * 1e-6) * SECOND)
+            under_way.append((arrives, round(rate * reached), now))
+            request += 200_000
+        for _, stamp, since in sorted((one for one in under_way if one[0] <= now), key=lambda one: one[:2]):
+            if since is None:
+                clock.observe(now, stamp)
+            else:
+                clock.answered(since, now, stamp)
+        under_way = [one for one in under_way if one[0] > now]
+        wall.wait_until(now + 10_000)
+    assert clock.known
+    return clock
+
+
+@pytest.mark.parametrize("growth", [-0.02, 0.006, 0.01, 0.05, 0.15, 0.3])
+@pytest.mark.parametrize("both", [False, True])
+def test_a_delay_that_grows_evenly_is_no_simulation_if_the_autopilot_answers(growth, both):
+    """For as long as anybody looks, on the way back or on both: stamps alone show a clock of another rate."""
+    begin = 1.0 if growth < 0 else 0.02
+
+    def back(t):
+        return begin + growth * t
+
+    assert not decided(1.0, back if both else lambda _t: 0.02, back).simulated
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.98, 0.99, 1.011, 1.02, 5.0])
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_simulation_is_known_as_one_though_it_answers(rate, asked):
+    clock = decided(rate, lambda _t: 0.02, lambda t: 0.02 + 0.02 * math.sin(3.0 * t) ** 2, asked=asked)
+    assert clock.simulated
+
+
 @given(
     shape=st.sampled_from(("sine", "steps", "rising", "falling")),
     swing=st.floats(0.02, 0.45),

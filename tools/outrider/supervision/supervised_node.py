@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from companion.dry_run import DryRun
+from companion.estimation.time_sync import Answer
 from companion.flight.hold_on_exit import HoldOnExit
 from companion.node import Companion
 from companion.telemetry.status_text import Severity
@@ -35,6 +36,8 @@ SETTLING_US = 1_000_000
 
 The vehicle follows its plan late.
 """
+_MAX_OPEN_REQUESTS = 32
+"""Number of TIMESYNC requests whose answers may still count."""
 _OTHERS = ("swarm", "target")
 
 
@@ -61,6 +64,8 @@ class SupervisedNode:
         self._gate = TakeoffInhibit(companion.system, signing)
         self._warned = False
         self._stamp = 0
+        self._asked: dict[int, int] = {}
+        self._answer: Answer | None = None
         self._rests_for = self._stepped = 0
         self.settled = followed is None or followed.known
         """Whether the rate of the own clock is known."""
@@ -115,9 +120,13 @@ class SupervisedNode:
         if (barred == DUPLICATE) != self._warned:
             self._warned = barred == DUPLICATE
             self.companion.reporter.report(Severity.CRITICAL, "Own system id used twice", begins=self._warned)
+        judges = self._followed is not None and self._followed.verdict is None
+        self.companion.round_trips.always = judges and self._stamp > 0
         leaving = self.companion.step(now, inbox) + answers
         self._rests_for = self._rests_for + now - self._stepped if self.companion.rests(now) else 0
         self._stepped = now
+        if judges:
+            self._note_round_trips(now, wall)
         stamp = self.companion.world.stamp
         if self._followed is not None and stamp != self._stamp:
             self._stamp = stamp
@@ -127,3 +136,18 @@ class SupervisedNode:
             self.settled = self._followed.known
             leaving = [datagram for datagram in leaving if datagram.link not in _OTHERS]
         return leaving
+
+    def _note_round_trips(self, now: int, wall: int) -> None:
+        """Tell the followed clock of the companion's round trips to the autopilot, in wall time."""
+        trips = self.companion.round_trips
+        if trips.requested == now:
+            self._asked[now] = wall
+            if len(self._asked) > _MAX_OPEN_REQUESTS:
+                del self._asked[min(self._asked)]
+        answer = trips.last
+        if self._followed is None or answer is None or answer is self._answer:
+            return
+        self._answer = answer
+        asked = self._asked.pop(answer.asked, None)
+        if asked is not None:
+            self._followed.answered(asked, wall, answer.stamp)
