@@ -45,6 +45,8 @@ _PRIORITY_US = 1_000_000
 
 See ``_rank``.
 """
+_LATE_US = 50_000
+"""A message dated further (µs) before arrival and least delay is late, or its sender has another clock."""
 _KEPT_US = 3_000_000
 """A vehicle stays in a perception formation for this time (µs) after its last plan or position."""
 _FLEET_US = 5_000_000
@@ -103,7 +105,7 @@ class _Sender:
     @property
     def by_autopilot(self) -> bool:
         """Whether the track uses the autopilot's messages."""
-        return self.component == mavlink.MAV_COMP_ID_AUTOPILOT1
+        return bool(self.component == mavlink.MAV_COMP_ID_AUTOPILOT1)
 
     def prefers(self, now: int, component: int) -> bool:
         """Return whether messages of another ``component`` are ignored at ``now`` (µs)."""
@@ -152,6 +154,9 @@ class Neighbours:
         self.relevance = RelevanceFilter(config)
         self._trusted = TrustedPeers()
         self._uncertainty = ReportedUncertainty()
+        # Only committed plans keep clear of balls, see ``as_arrived``.
+        self._watches_lateness = config.avoidance == "certified"
+        self._late: dict[int, tuple[int, Measured]] = {}
 
     @property
     def brief(self) -> bool:
@@ -184,6 +189,8 @@ class Neighbours:
         placed = measurement_of(self._fleet, message, self._velocity_up)
         before, time_before = track.belief, track.time
         accepted = track.take(now, placed, message.time_boot)
+        if self._watches_lateness and placed is not None:
+            self._note_lateness(now, system, track.when(now, message.time_boot), placed)
         belief, time = track.belief, track.time
         if belief is None or time is None:
             return
@@ -200,6 +207,26 @@ class Neighbours:
         if time != time_before:
             sender.received = now
         self._fresh[sender.row] = belief.x, time, sender.received
+
+    def _note_lateness(self, now: int, system: int, when: int, placed: Measured) -> None:
+        """Note the measurement ``placed`` of ``system`` if it seems late; ``when`` (µs): its date."""
+        arrived = now - self._config.neighbour.delay_us
+        if when < arrived - _LATE_US:
+            self._late[system] = arrived, placed
+        else:
+            self._late.pop(system, None)
+
+    def as_arrived(self) -> list[tuple[int, int, Array, Array]]:
+        """Return what ``last_received`` does, dated by arrival, of neighbours whose last message seems late.
+
+        Either the message is late, and ``last_received`` is right; or the sender's clock began anew, and this
+        is right, while the dates that contradict each other spoil the track. Nobody can tell for a while.
+        """
+        return [
+            (system, time, np.array(placed[:3]), np.array(placed[3:]))
+            for system, (time, placed) in self._late.items()
+            if len(placed) == 6
+        ]
 
     def _add(self, now: int, system: int) -> int:
         """Add a row for ``system``, first received at ``now`` (µs); return its index."""

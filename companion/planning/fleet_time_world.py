@@ -19,11 +19,17 @@ class _Neighbours:
 
     def last_received(self) -> list[tuple[int, int, Array, Array]]:
         """Return ``Neighbours.last_received`` in fleet time."""
+        return self._in_fleet_time(self._neighbours.last_received())
+
+    def as_arrived(self) -> list[tuple[int, int, Array, Array]]:
+        """Return ``Neighbours.as_arrived`` in fleet time."""
+        return self._in_fleet_time(self._neighbours.as_arrived())
+
+    def _in_fleet_time(
+        self, states: list[tuple[int, int, Array, Array]]
+    ) -> list[tuple[int, int, Array, Array]]:
         ahead = self._clock.ahead or 0
-        return [
-            (system, time + ahead, position, velocity)
-            for system, time, position, velocity in self._neighbours.last_received()
-        ]
+        return [(system, time + ahead, position, velocity) for system, time, position, velocity in states]
 
 
 class _Sensed:

@@ -61,9 +61,14 @@ class NonCooperative:
         self._seconds: Array = 1e-6 * own.dt_us * np.arange(steps + 1.0)
 
     def seen(self, begins: int, members: Set[int], world: World) -> list[NonCooperativeVehicle]:
-        """Return all received vehicles except ``members``, with their ages at ``begins`` (µs)."""
+        """Return all received vehicles except ``members``, with their ages at ``begins`` (µs).
+
+        A vehicle whose last message seems late is there twice: as it was by its clock, and as the message
+        says, as if that had just been sent. Its clock may have begun anew.
+        """
         found = []
-        for system, time, position, velocity in world.neighbours.last_received():
+        neighbours = world.neighbours
+        for system, time, position, velocity in (*neighbours.last_received(), *neighbours.as_arrived()):
             if system not in members:
                 age = max(1e-6 * (begins - time), 0.0)
                 found.append(

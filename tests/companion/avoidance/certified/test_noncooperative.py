@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.avoidance.certified.committed import controls, resting
 from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.certified.margins import reachable
 from companion.avoidance.certified.noncooperative import NonCooperative
 from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
@@ -129,3 +131,37 @@ def test_the_target_is_where_it_will_be_whenever_in_an_epoch_it_is_asked_for(lat
     knots = 1.0 + 1e-6 * of.certified.dt_us * np.arange(STEPS)
     np.testing.assert_allclose(centres[:, 0], HERE + knots[:, None] * velocity, atol=1e-9)
     assert not others
+
+
+@pytest.mark.parametrize("jump", [0.1, 0.7, 1.9, 3.0, 60.0, -5.0, -60.0])
+@pytest.mark.parametrize("turn", [0.0, 1.0])
+@pytest.mark.parametrize("hz", [4, 10])
+def test_the_balls_hold_a_vehicle_whose_clock_begins_anew(jump: float, turn: float, hz: int) -> None:
+    """At 5 m/s, with ``turn`` (m/s²); after ten seconds its stamps step back by ``jump`` seconds."""
+    of, speed = config(noncooperative_speed=5.0, noncooperative_acceleration=1.0), 5.0
+    world, seconds = World(of, OWN, 10, FLEET), np.array([0.0, 0.2])
+    seeing, delay = NonCooperative(of, STEPS), of.neighbour.delay_us
+
+    def true(t: float) -> tuple[Array, Array]:
+        angle, radius = turn / speed * t, speed**2 / (turn or 1.0)
+        if turn == 0.0:
+            return np.array([speed * t, 0.0, 5.0]), np.array([speed, 0.0, 0.0])
+        ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
+        return np.array([radius * ahead[1], radius * (1.0 - ahead[0]), 5.0]), speed * ahead
+
+    for k in range(20 * hz):
+        place, velocity = true(k / hz)
+        latitude, longitude, altitude = FLEET.to_geodetic(place)
+        ned = (float(velocity[1]), float(velocity[0]), float(-velocity[2]))
+        sent = round(1e6 * k / hz)
+        stamp = 100_000_000 + sent - (round(1e6 * jump) if k >= 10 * hz else 0)
+        message = GlobalPosition(Source(OTHER, 1), stamp, latitude, longitude, altitude, 0.0, ned, None)
+        world.receive(NOW + sent + delay, "swarm", message)
+        for later in (0, round(4e5 / hz)):
+            now = NOW + sent + delay + later
+            apart = []
+            for one in seeing.seen(now, frozenset(), world):
+                centres, reach = reachable(one.position, one.velocity, one.age, seconds, 5.0, 1.0)
+                off = centres[0, 1] - true(1e-6 * (now - NOW) + 0.1)[0]
+                apart.append(float(np.linalg.norm(off)) - reach[0])
+            assert min(apart) <= 0.05
