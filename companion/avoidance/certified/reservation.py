@@ -65,10 +65,12 @@ class Reservation:
         if newest is not None:
             agreements.made(newest)
         if self.joined and (not joins or (agreements.unreserved() and agreements.near())):
-            self.joined, self._since = False, None
+            self.joined = False
+            self._since, self.was_reserved = None, False
         elif joins and not self.joined and not (self._in_the_way or agreements.near()):
             agreements.rejoin()
-            self.joined = True
+            # A reservation of the last flight ended with the agreements, at the farewell.
+            self._since, self.was_reserved, self.joined = None, False, True
 
     def _off(self, place: Array) -> float:
         """Return how far (m) ``place`` (3,) is from the axis of the own column; ∞ without a column."""

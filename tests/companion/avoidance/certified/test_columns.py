@@ -218,6 +218,18 @@ def test_a_column_that_is_begun_elsewhere_has_not_been_reserved() -> None:
         assert flight.reservation.was_reserved is (number in (2, 3))
 
 
+def test_no_reservation_survives_a_landing() -> None:
+    """Its agreements ended with the farewell, though the column is the same; the next is waited for anew."""
+    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    stands, reserved = Motion(np.zeros(3), np.zeros(3), np.zeros(3)), []
+    for number, joins in enumerate((True, True, True, True, False, False, True, True, True, True)):
+        now = EPOCH + number * LENGTH
+        flight.park(now, stands, joins=joins)
+        flight.messages(now, farewell=not joins)
+        reserved.append(flight.reservation.was_reserved)
+    assert reserved == [False, False, True, True, False, False, False, False, True, True]
+
+
 def test_who_does_not_take_off_is_passed_and_is_not_waited_for() -> None:
     swarm = fly([Habits(takes_off=NEVER), Habits(), Habits()], Rough(0.2, 100_000), 3)
     assert not swarm.faults()
