@@ -146,6 +146,31 @@ def test_on_a_signed_link_only_holders_of_the_key_count(sender: str, found: bool
     assert duplicates.seen == found
 
 
+@pytest.mark.parametrize(
+    ("pace", "reported"), [(1.0, True), (0.0, False), (-1.0, False)], ids=["a twin", "one frame", "backwards"]
+)
+@pytest.mark.parametrize("behind", [5.0, 3600.0])
+def test_a_signed_twin_whose_clock_is_behind_is_reported_and_bars_no_go(
+    pace: float, reported: bool, behind: float
+) -> None:
+    """A stranger who plays a recording looks the same, and may not block the go."""
+    clock, key = SimulatedClock(1_700_000_000 * SECOND), Key.of_passphrase("ours")
+    duplicates, theirs = DuplicateIds(1, clock, key), Signing(key)
+    other, began, frames = Codec(signing=theirs), clock.now(), []
+    for k in range(8):
+        theirs.present(began - round(behind * SECOND) + k * SECOND // 2)
+        frames.append(other.encode(heartbeat(k)))
+    if pace <= 0.0:
+        frames = frames[:1] * 8 if pace == 0.0 else frames[::-1]
+    for frame in frames:
+        duplicates.received(Header(*OWN, 0), frame)
+        clock.wait_until(clock.now() + SECOND // 2)
+    assert duplicates.behind == reported
+    assert not duplicates.seen
+    clock.wait_until(clock.now() + 11 * SECOND)
+    assert not duplicates.behind
+
+
 def heartbeat(mode: int) -> Heartbeat:
     return Heartbeat(OWN, 18, 8, 0, mode, 4)
 

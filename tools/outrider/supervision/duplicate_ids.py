@@ -4,14 +4,16 @@ Such a sender exists if two vehicles have the same system id, and so ignore each
 control one vehicle.
 
 With a key only frames that it signed count: anyone may send the own ids in an unsigned frame, or send frames
-again that were recorded.
+again that were recorded. Signed frames with stamps from before the start are either recordings or those of a
+duplicate whose clock is behind; nothing in them tells which. So they do not count. Where their stamps advance
+with time, as those of a running companion do, they are reported (``behind``).
 """
 
 from __future__ import annotations
 
 import hmac
 from collections import OrderedDict
-from typing import Final
+from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -32,6 +34,19 @@ of a previous companion. After the second time without messages it counts as gon
 """
 
 
+_MIN_ADVANCE: Final = 0.5
+"""Least advance of old stamps, as a share of the time in which their frames arrive."""
+
+
+class _Old(NamedTuple):
+    """Signed frames with old stamps: times (µs) of the first and the last, and their stamps (10 µs)."""
+
+    first: int
+    last: int
+    began: int
+    stamp: int
+
+
 class DuplicateIds:
     """Detector of a duplicate on the links of the companion of ``system``.
 
@@ -50,6 +65,7 @@ class DuplicateIds:
         """Stamp up to which signed frames may be recordings."""
         self._first: int | None = None
         self._last: int | None = None
+        self._behind: _Old | None = None
 
     def said(self, data: bytes) -> None:
         """Record the frames of a sent datagram."""
@@ -65,20 +81,23 @@ class DuplicateIds:
         """Check a received frame."""
         if (header.system, header.component) != self._own or hash(frame) in self._said:
             return
-        if self._key is not None and not self._credible(frame, self._key):
-            return
         now = self._clock.now()
+        if self._key is not None:
+            if not _signed(frame, self._key):
+                return
+            if (stamp := _stamp(frame)) <= self._floor:
+                self._note_old(now, stamp)
+                return
         if self._first is None or self._last is None or now - self._last > _MAX_SILENCE_US:
             self._first = now
         self._last = now
 
-    def _credible(self, frame: bytes, key: Key) -> bool:
-        """Return whether ``frame`` is signed with ``key`` and is no recording."""
-        if frame[0] != mavlink.PROTOCOL_MARKER_V2 or not frame[2] & mavlink.MAVLINK_IFLAG_SIGNED:
-            return False
-        if _stamp(frame) <= self._floor:
-            return False
-        return hmac.compare_digest(key.signature(frame[:-6]), frame[-6:])
+    def _note_old(self, now: int, stamp: int) -> None:
+        """Note a signed frame whose stamp is not later than the start."""
+        old = self._behind
+        if old is None or stamp <= old.stamp or now - old.last > _MAX_SILENCE_US:
+            self._behind = old = _Old(now, now, stamp, stamp)
+        self._behind = old._replace(last=now, stamp=stamp)
 
     @property
     def seen(self) -> bool:
@@ -87,6 +106,22 @@ class DuplicateIds:
         if first is None or last is None:
             return False
         return last - first >= _MIN_SPAN_US and self._clock.now() - last <= _MAX_SILENCE_US
+
+    @property
+    def behind(self) -> bool:
+        """Whether there are signed frames with old stamps that advance with time."""
+        old = self._behind
+        if old is None or self._clock.now() - old.last > _MAX_SILENCE_US:
+            return False
+        span = old.last - old.first
+        return span >= _MIN_SPAN_US and (old.stamp - old.began) * UNIT >= _MIN_ADVANCE * span
+
+
+def _signed(frame: bytes, key: Key) -> bool:
+    """Return whether ``frame`` is signed with ``key``."""
+    if frame[0] != mavlink.PROTOCOL_MARKER_V2 or not frame[2] & mavlink.MAVLINK_IFLAG_SIGNED:
+        return False
+    return hmac.compare_digest(key.signature(frame[:-6]), frame[-6:])
 
 
 def _stamp(frame: bytes) -> int:

@@ -26,6 +26,8 @@ from outrider.supervision.takeoff_inhibit import TakeoffInhibit
 CLOCK = "the rate of the autopilot's clock"
 DUPLICATE = "the other companion with this system id to fall silent"
 """``CLOCK`` and ``DUPLICATE``: conditions for which any order to take off has to wait, as text."""
+BEHIND = "Own id: twin's clock behind, or replay"
+"""Text about signed frames with the own ids and old stamps: those of a duplicate, or recordings."""
 OURS = (Phase.PREPARE, *STEERED, Phase.LAND)
 """Phases in which the companion controls the vehicle.
 
@@ -122,6 +124,8 @@ class SupervisedNode:
             self.companion.reporter.report(Severity.CRITICAL, "Own system id used twice", begins=self._warned)
         judges = self._followed is not None and self._followed.verdict is None
         self.companion.round_trips.always = judges and self._stamp > 0
+        if self._duplicates is not None:
+            self.companion.reporter.watch(self._duplicates.behind, BEHIND, f"Over: {BEHIND}")
         leaving = self.companion.step(now, inbox) + answers
         self._rests_for = self._rests_for + now - self._stepped if self.companion.rests(now) else 0
         self._stepped = now
