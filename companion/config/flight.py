@@ -80,6 +80,11 @@ class GuardConfig(Settings):
     fence_height: float | None = Field(
         None, gt=0.0, description="m above the fleet origin; beyond, the vehicle returns"
     )
+    least_height: Positive | None = Field(
+        None,
+        description="m above the place of the take-off; plans of the field go no lower, as with the floor of"
+        " the box, whichever is higher, but the last quarter of the box stays free; null: the box alone",
+    )
     displaced: Positive = Field(
         5.0, description="m by which the own place may change with the autopilot's origin; beyond, it lands"
     )

@@ -20,6 +20,7 @@ from companion.flight.autopilots import Loop, Profile, Step
 from companion.flight.command_protocol import Commands
 from companion.flight.control_authority import ControlAuthority, Owner, Passage
 from companion.flight.landing import Landing, landed
+from companion.flight.lowering import Lowered
 from companion.flight.readiness import Readiness
 from companion.flight.takeoff import Takeoff
 from companion.flight.vehicle import Vehicle
@@ -69,6 +70,8 @@ class Pilot:
         self._owner = Owner.OURS
         self._arming = 0
         self._takeoff = Takeoff(self.vehicle, self._commands, origin_altitude)
+        self._above_floor = self.limits.lowered
+        self._floor_of: tuple[Lowered, float] | None = None
 
     @property
     def profile(self) -> Profile | None:
@@ -250,8 +253,24 @@ class Pilot:
 
     @property
     def planned_limits(self) -> LimitsConfig:
-        """Limits for plans: the configured ones, lowered to what the autopilot can follow."""
-        return self.limits.lowered.limits
+        """Limits for plans, see ``lowered``."""
+        return self.lowered.limits
+
+    @property
+    def lowered(self) -> Lowered:
+        """Limits for plans: the configured ones, lowered to what the autopilot can follow.
+
+        With ``guard.least_height`` the box's floor is at least so high above the place of the take-off. It is
+        not for a vehicle that was taken over in flight, whose take-off is not known. The same object is
+        returned as long as nothing changes.
+        """
+        lowered, start, least = self.limits.lowered, self.start, self._config.guard.least_height
+        if least is None or start is None or self._takeoff.began_in_flight:
+            return lowered
+        of = lowered, float(start[2]) + least
+        if self._floor_of != of:
+            self._floor_of, self._above_floor = of, _above(*of)
+        return self._above_floor
 
     def returned(self) -> None:
         """Report that the returning vehicle is at its start: it settles and lands."""
@@ -446,3 +465,10 @@ class Pilot:
         elif step is not None and takeoff.step(profile) is step:
             self.waiting_for = step.value if climbs or step is not Step.TAKEOFF else self.column_waits
         return sent
+
+
+def _above(lowered: Lowered, floor: float) -> Lowered:
+    """Return ``lowered`` with a box whose floor is at ``floor`` (m) at least, or at three quarters of it."""
+    low, high = lowered.limits.box_min, lowered.limits.box_max
+    raised = max(low[2], min(floor, low[2] + 0.75 * (high[2] - low[2])))
+    return lowered._replace(limits=lowered.limits.model_copy(update={"box_min": (*low[:2], raised)}))

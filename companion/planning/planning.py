@@ -44,7 +44,7 @@ class Planning:
         self._avoidance = avoidance
         self._heading = Heading(config.heading, config.horizon)
         self._frame: LocalFrame | None = None
-        self._lowered = pilot.limits.lowered
+        self._lowered = pilot.lowered
         self.fastest: Array = np.array(config.limits.v_max)
         """v_max (3,), m/s, as lowered by the autopilot's parameters."""
         self._stepped = 0
@@ -65,8 +65,8 @@ class Planning:
             # Positions in the old frame must not be flown to in the new one.
             self._frame = view.local
             avoidance.discard()
-        if self._pilot.limits.lowered is not self._lowered:
-            self._keep(self._pilot.limits.lowered)
+        if (lowered := self._pilot.lowered) is not self._lowered:
+            self._keep(lowered)
         avoidance.pause(now - self._stepped)
         self._stepped = now
         if view.own is None or view.local is None:

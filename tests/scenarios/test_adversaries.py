@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.scenarios.adversary import ADVERSARIES, Pressed, descending, press, shipped
-from tests.scenarios.single_vehicle import SingleVehicle
+from tests.scenarios.single_vehicle import SITE, SingleVehicle
 
 PLAIN: dict[str, Any] = {"rates": {"replan_us": 50_000}}
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -87,3 +87,30 @@ def test_a_forged_neighbour_above_it_presses_a_shipped_companion_not_to_the_grou
     pressed = press(vehicle, ADVERSARIES["above"], 20.0, 1)
     check(vehicle, pressed)
     assert pressed.speeds[:, 2].min() >= -vehicle.config.limits.v_max[2]
+
+
+@pytest.mark.parametrize(
+    ("name", "flavour"),
+    [
+        ("above", "px4"),
+        *[
+            pytest.param(name, "ardupilot", marks=pytest.mark.slow)
+            for name in ("above", "circling", "jumping")
+        ],
+    ],
+)
+def test_the_height_above_the_take_off_is_a_floor_like_the_boxs(name, flavour):
+    """It takes off 8 m above the fleet's zero: the box's floor at 2.5 m is below the ground there."""
+    settings = {**SETTINGS[flavour], "limits": {"box_min": [-20.0, -20.0, 2.5]}}
+    settings["limits"] = {**SETTINGS[flavour]["limits"], **settings["limits"]}
+    settings["guard"] = {**SETTINGS[flavour]["guard"], "least_height": 3.0}
+    vehicle = SingleVehicle(flavour, settings, response="firmware", altitude=SITE.altitude + 8.0)
+    vehicle.fly(5.0)
+    pressed = press(vehicle, ADVERSARIES[name], 8.0, 1)
+    assert len(pressed.asked) > 350
+    floor = vehicle.companion.pilot.start[2] + 3.0
+    assert floor > 10.5
+    assert pressed.asked[:, 2].min() >= floor
+    assert pressed.places[:, 2].min() >= floor
+    if name == "above":
+        assert pressed.places[:, 2].min() < floor + 1.0
