@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import atan2, degrees, hypot
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -33,7 +34,42 @@ class Post(Settings):
     height: Size = Field(100.0, description="m above the fleet origin")
 
 
-Obstacle = Annotated[Sphere | Post, Field(discriminator="kind")]
+class Box(Settings):
+    """Box with vertical sides; it hides what is behind it, and may stand on the ground or hang."""
+
+    kind: Literal["box"]
+    at: tuple[_Coordinate, _Coordinate, _Coordinate] = Field(description="centre, m, fleet-local ENU")
+    size: tuple[Size, Size, Size] = Field(
+        description="m: length along its own x and y axes, which ``yaw_deg`` turns, and height"
+    )
+    yaw_deg: float = Field(
+        0.0, ge=-360.0, le=360.0, description="degrees from east to its x axis, positive towards north"
+    )
+
+
+class Wall(Settings):
+    """Upright wall on the ground between two places, with flat ends: a box."""
+
+    kind: Literal["wall"]
+    ends: tuple[tuple[_Coordinate, _Coordinate], tuple[_Coordinate, _Coordinate]] = Field(
+        description="middles of its two ends, m east and north of the fleet origin"
+    )
+    thickness: Size = Field(0.2, description="m")
+    height: Size = Field(100.0, description="m above the fleet origin; its lower end is at 0")
+
+    @property
+    def box(self) -> Box:
+        """The same obstacle as a box."""
+        (x0, y0), (x1, y1) = self.ends
+        return Box(
+            kind="box",
+            at=(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * self.height),
+            size=(hypot(x1 - x0, y1 - y0), self.thickness, self.height),
+            yaw_deg=degrees(atan2(y1 - y0, x1 - x0)),
+        )
+
+
+Obstacle = Annotated[Sphere | Post | Box | Wall, Field(discriminator="kind")]
 
 
 class _Moving(Settings):
