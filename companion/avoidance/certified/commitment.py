@@ -199,7 +199,8 @@ class Commitment:
             reason = HoldReason.ROUNDING
             # The rounded plan is checked, because the others receive the rounded one.
             if kept(corridor, points):
-                ways = others.controls[:, -1, 2] - others.controls[:, 0, 0]
+                ways = np.zeros(answer.forces.shape)
+                ways[: len(others.controls)] = others.controls[:, -1, 2] - others.controls[:, 0, 0]
                 pushes = Pushes(answer.forces, ways / (1e-6 * self._config.dt_us * self._program.n))
                 moving = objective.moving
                 gradient = self._program.costs[moving].gradient_per_metre

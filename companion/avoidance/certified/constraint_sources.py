@@ -16,10 +16,12 @@ from companion.avoidance.certified.margins import beside, between, fastest, furt
 from companion.avoidance.certified.noncooperative import NonCooperative
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.separating_planes import Others
-from companion.avoidance.certified.visibility_graph import Discs
+from companion.avoidance.certified.visibility_graph import Discs, Rectangles
 from companion.config import CompanionConfig
-from companion.config.obstacles import Post
+from companion.config.obstacles import Post, Sphere
+from companion.obstacles.boxes import boxes_of
 from companion.obstacles.static import Axes, FixedObstacles
+from companion.values.boxes import Boxes, BoxIndex
 from companion.values.horizon import Array
 from companion.world import View, World
 
@@ -33,6 +35,8 @@ Vehicles that jostle for room rest for a shorter time, and the turn of the goal 
 """
 _BESIDE_M = 0.05
 """Distance (m) of a way from what plans must keep clear of."""
+_AROUND_M, _MOST_BOXES = 20.0, 24
+"""How far (m) beside the ends of a way boxes are looked at, and how many of them at most."""
 
 
 class ConstraintSources:
@@ -45,10 +49,14 @@ class ConstraintSources:
         """Least distance (m) between two plans."""
         self._further = further(own)
         self._margin = margin(own, config.field, config.limits)
+        self._from_surfaces = config.field.d_min + self._margin
+        """Least distance (m) of a plan from a surface."""
         self._beside = beside(own, config.field, config.limits)
         self._silent_us = config.guard.neighbour_lost_us
-        self._posts = FixedObstacles(tuple(o for o in config.obstacles if isinstance(o, Post)))
-        self._balls = FixedObstacles(tuple(o for o in config.obstacles if not isinstance(o, Post)))
+        self._round = [one for one in config.obstacles if isinstance(one, Post | Sphere)]
+        self._posts = FixedObstacles([one for one in self._round if isinstance(one, Post)])
+        self._balls = FixedObstacles([one for one in self._round if isinstance(one, Sphere)])
+        self._boxes = BoxIndex(boxes_of(config.obstacles))
         self._noncooperative = NonCooperative(config, steps)
         self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + self.between + _SIGHT_MARGIN_M
 
@@ -98,7 +106,15 @@ class ConstraintSources:
             of_vehicles = [*range(last), *range(first, first + len(strangers))]
             heights[of_vehicles] = 1.0 / self._config.field.downwash
         shares = np.arange(len(bases)) < count
-        others = Others(_stacked(bases, n), _stacked(controls, n), distance, shares, heights)
+        others = Others(
+            _stacked(bases, n),
+            _stacked(controls, n),
+            distance,
+            shares,
+            heights,
+            self._boxes_near(own),
+            self._from_surfaces,
+        )
         return others, self._noncooperative.field(seen, own, sensed)
 
     def _fixed_constraints(self, own: Array) -> list[tuple[Array, float]]:
@@ -119,6 +135,21 @@ class ConstraintSources:
                 least = self._config.field.d_min + radius + self._margin
                 found.append((centres, least))
         return found
+
+    def _boxes_near(self, own: Array) -> Boxes | None:
+        """Return the boxes near the plan ``own`` (n, 3, 3), m; None where no box is configured.
+
+        In a plane of fixed height those far above or below it are left out.
+        """
+        if not len(self._boxes.boxes.centres):
+            return None
+        points = own.reshape(-1, 3)
+        low, high = points.min(axis=0), points.max(axis=0)
+        found = self._boxes.boxes.chosen(self._boxes.near(low[:2] - self._sight, high[:2] + self._sight))
+        if not self._config.planar:
+            return found
+        above = np.abs(found.centres[:, 2] - 0.5 * (low[2] + high[2])) - found.halves[:, 2]
+        return found.chosen(np.flatnonzero(above < self._from_surfaces + 0.5 * (high[2] - low[2])))
 
     def _sensed_constraints(self, sensed: Axes) -> list[tuple[Array, float]]:
         """Return what sensors detect, and the predicted paths of traffic, as fixed obstacles.
@@ -167,15 +198,16 @@ class ConstraintSources:
         """
         return levelled(np.broadcast_to(place, own.shape), own), least
 
-    def resting(self, epoch: int, heights: tuple[float, float], agreements: Agreements) -> list[Discs]:
+    def resting(self, epoch: int, here: Array, there: Array, agreements: Agreements) -> list[Discs]:
         """Return the discs that a way must avoid from ``epoch`` (µs) on; then those that stay for ever alone.
 
-        They are seen from above: where posts, spheres, landed vehicles, and vehicles whose newest plan rests
-        keep a vehicle away whose height is in ``heights`` (m, least and most).
+        They are seen from above: where posts, spheres, boxes, landed vehicles, and vehicles whose newest plan
+        rests keep a vehicle away whose height is between those of ``here`` and ``there`` (3,), m, where the
+        way begins and ends.
         """
-        low, high = heights
+        low, high = min(here[2], there[2]), max(here[2], there[2])
         fixed = []
-        for one in self._config.obstacles:
+        for one in self._round:
             above = 0.0 if isinstance(one, Post) else max(one.at[2] - high, low - one.at[2], 0.0)
             fixed.append((one.at[:2], self._config.field.d_min + one.radius + self._margin, above))
         landed = [
@@ -187,7 +219,31 @@ class ConstraintSources:
                 level = self._config.planar or system in agreements.columns
                 above = 0.0 if level else max(end[2] - high, low - end[2], 0.0) / self._config.field.downwash
                 vehicles.append((tuple(end[:2]), self.between, above))
-        return [_discs(fixed + landed + vehicles), _discs(fixed + landed)]
+        rectangles = self._rectangles(here, there)
+        return [
+            _discs(found)._replace(rectangles=rectangles)
+            for found in (fixed + landed + vehicles, fixed + landed)
+        ]
+
+    def _rectangles(self, here: Array, there: Array) -> Rectangles:
+        """Return where boxes keep a vehicle away on a way from ``here`` to ``there`` (3,), m.
+
+        These are the ``_MOST_BOXES`` nearest to ``here`` of those about the way: the search takes time with
+        the square of their number, and a way around those is good for the next metres.
+        """
+        low, high = np.minimum(here, there), np.maximum(here, there)
+        rows = self._boxes.near(low[:2] - _AROUND_M, high[:2] + _AROUND_M)
+        boxes = self._boxes.boxes.chosen(rows)
+        above = np.maximum(boxes.centres[:, 2] - high[2], low[2] - boxes.centres[:, 2]) - boxes.halves[:, 2]
+        above = np.maximum(above, 0.0)
+        keep = np.flatnonzero(above < self._from_surfaces)
+        radii = np.sqrt(self._from_surfaces**2 - above[keep] ** 2) + _BESIDE_M
+        boxes = boxes.chosen(keep)
+        found = Rectangles(boxes.centres[:, :2], boxes.halves[:, :2], boxes.turns, radii)
+        if len(radii) <= _MOST_BOXES:
+            return found
+        nearest = np.argsort(found.distance(here[None, :2])[0], kind="stable")[:_MOST_BOXES]
+        return Rectangles(*(part[nearest] for part in found))
 
 
 def _stacked(plans: list[Array], steps: int) -> Array:

@@ -286,13 +286,12 @@ class CertifiedFlight:
 
     def _subgoal(self, now: int, epoch: int, rest: Array, destination: Array) -> Subgoal:
         """Return where the plan should end: ``destination`` (3,), m, or a place on a way round to it."""
-        heights = min(rest[2], destination[2]), max(rest[2], destination[2])
         begun = self._detour.begun
         subgoal = self._detour.towards(
             now,
             rest,
             destination,
-            lambda: self._sources.resting(epoch, heights, self.agreements),
+            lambda: self._sources.resting(epoch, rest, destination, self.agreements),
             stalled=self._deadlock_turn.stalled,
         )
         if self._detour.begun != begun:

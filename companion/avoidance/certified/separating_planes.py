@@ -13,6 +13,7 @@ neighbour's new plan must satisfy the same from the other side. So any two new p
 along c at every control point, hence everywhere on the segment (a Bézier curve lies in the hull of its
 control points). The own plan of the pair itself satisfies it, with room max(c·r_i − d, 0)/2. For an obstacle
 that shares no plan the own side keeps the whole distance, and the own plan of the pair is the committed one.
+``box_planes`` has the planes of boxes.
 
 With ``downwash`` w > 1 the distance of two vehicles is ‖S Δ‖ with S = diag(1, 1, 1/w): the construction is
 that of the plans S p, and c·S q_i is (S c)·q_i, so S c is the normal of the rows. S is linear: hulls remain
@@ -27,6 +28,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.avoidance.certified.box_planes import box_planes
+from companion.values.boxes import Boxes
 from companion.values.compiled import BOOL, FLOAT, VOID, array, kernel, output, part
 from companion.values.horizon import Array
 
@@ -39,7 +42,7 @@ class Others(NamedTuple):
     ``own`` and ``controls`` (M, n, 3, 3), m: control points of the own plan and of the other plan of each
     pair, on the committed plan's knots. ``distance`` (M, n), m: least distance on each segment. ``shares``
     (M,): whether the other side keeps half of it itself. ``heights`` (M,): 1/w, by which differences in
-    height are multiplied; None: 1.
+    height are multiplied; None: 1. ``boxes``: B boxes to keep ``from_boxes`` (m) from; None: none.
     """
 
     own: Array
@@ -47,10 +50,14 @@ class Others(NamedTuple):
     distance: Array
     shares: NDArray[np.bool_]
     heights: Array | None = None
+    boxes: Boxes | None = None
+    from_boxes: float = 0.0
 
 
 class Planes(NamedTuple):
     """Normals c (M, n, 3), or S c where heights count less, and the least c·q of control points (M, n, 3).
+
+    Those of boxes come after those of the M pairs.
 
     ``least`` is what must hold; ``wanted`` is slightly more where the committed plan allows it, so that a
     rounded plan still keeps ``least``.
@@ -73,7 +80,10 @@ def planes(committed: Array, others: Others, spare: float, *, upright: bool = Fa
     )
     heights = np.ones(len(own)) if others.heights is None else np.ascontiguousarray(others.heights)
     _planes(committed, own, controls, distance, others.shares, heights, spare, upright, *found)
-    return found
+    if others.boxes is None or not len(others.boxes.centres):
+        return found
+    of_boxes = box_planes(committed, others.boxes, others.from_boxes, spare, upright=upright)
+    return Planes(*(np.concatenate(parts) for parts in zip(found, of_boxes, strict=True)))
 
 
 def keeps(
