@@ -13,9 +13,12 @@ import numpy as np
 
 from companion.config import CompanionConfig
 from companion.config.formation import Perception
+from companion.config.obstacles import Post, Sphere
 from companion.goals.field_of_view import in_view
-from companion.goals.hiding import fixed_occluder, hidden_arcs, vehicle_occluder, way_out
+from companion.goals.hiding import box_arcs, fixed_occluder, hidden_arcs, vehicle_occluder, way_out
 from companion.goals.viewpoints import Crossing, anisotropy, aside, descent, weight
+from companion.obstacles.boxes import boxes_of
+from companion.values.boxes import BoxIndex
 from companion.values.horizon import Array
 from companion.values.mates import Mates, Sight
 
@@ -35,7 +38,8 @@ class PerceptionFormation:
     ) -> None:
         self._formation, self._system, self._ahead = formation, system, lookahead_s
         self._crossing = Crossing()
-        self._fixed = [fixed_occluder(obstacle) for obstacle in config.obstacles]
+        self._fixed = [fixed_occluder(one) for one in config.obstacles if isinstance(one, Sphere | Post)]
+        self._boxes = BoxIndex(boxes_of(config.obstacles))
 
     def turn(self, now: int, target: Array, offset: Array, place: Array, mates: Mates, sight: Sight) -> float:
         """Return the angle (rad), counter-clockwise, by which to turn the destination ``place`` (3,).
@@ -64,6 +68,9 @@ class PerceptionFormation:
         turn = copysign(max(abs(turn) - _REST_RAD, 0.0), turn)
         occluders = [*self._fixed, *map(vehicle_occluder, mates.positions)]
         arcs = hidden_arcs(target, place, occluders, formation.clear)
+        within = radius + formation.clear
+        near = self._boxes.near(target[:2] - within, target[:2] + within)
+        arcs += box_arcs(target, place, self._boxes.boxes.chosen(near), formation.clear)
         turn += formation.hidden_gain * way_out(float(bearings[own]), arcs, left=self._system % 2 == 0)
         return max(-largest, min(largest, turn))
 

@@ -62,7 +62,7 @@ def _try(c: Array, triangle: Array, half: Array, upright: bool, best: Array, fur
     if room <= furthest:
         return furthest
     best[:] = c
-    return room
+    return float(room)
 
 
 @part

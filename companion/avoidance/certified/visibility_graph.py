@@ -48,11 +48,12 @@ class Rectangles(NamedTuple):
         """Return the corners of the sides, (R, 4, 2), m."""
         x, y = np.moveaxis(self.halves[:, None] * _SIGNS, -1, 0)
         cos, sin = self.turns.T[..., None]
-        return self.centres[:, None] + np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+        result: Array = self.centres[:, None] + np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+        return result
 
 
 _SIGNS = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
-_NO_RECTANGLES = Rectangles(*np.empty((3, 0, 2)), np.empty(0))
+_NO_RECTANGLES = Rectangles(np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 2)), np.empty(0))
 
 
 class Discs(NamedTuple):

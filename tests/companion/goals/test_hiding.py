@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.config.obstacles import Post, Sphere
-from companion.goals.hiding import Arc, fixed_occluder, hidden_arcs, vehicle_occluder, way_out
+from companion.goals.hiding import Arc, box_arcs, fixed_occluder, hidden_arcs, vehicle_occluder, way_out
 from companion.values.bearings import turned, wrapped
+from companion.values.boxes import Boxes, distances
 
 TARGET = np.array([3.0, -2.0, 0.0])
 PLACE = np.array([4.0, 0.0, 5.0])
@@ -76,3 +77,40 @@ def test_in_the_middle_each_takes_its_side():
 
 def test_where_everything_is_hidden_nothing_turns():
     assert way_out(0.3, [Arc(middle, 1.5) for middle in (0.0, 2.0, 4.0)], left=True) == 0.0
+
+
+def _hidden(arcs: list[Arc], bearing: float) -> bool:
+    return any(abs(float(wrapped(np.array(bearing - arc.middle)))) < arc.half for arc in arcs)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_boxes_hide_the_bearings_whose_ray_to_the_camera_enters_them(seed):
+    """To the two degrees between rays; hanging plates and walls that reach past the camera among them."""
+    rng = np.random.default_rng(seed)
+    angles = rng.uniform(-np.pi, np.pi, 4)
+    boxes = Boxes(
+        TARGET + rng.uniform(-6.0, 6.0, (4, 3)),
+        10.0 ** rng.uniform(-1.0, 0.7, (4, 3)),
+        np.stack([np.cos(angles), np.sin(angles)], axis=1),
+    )
+    arcs = box_arcs(TARGET, PLACE, boxes, CLEAR)
+    grown = boxes._replace(halves=boxes.halves + CLEAR)
+    grown = grown.chosen(np.flatnonzero(distances(TARGET, grown) > 0.0))
+    shares = np.linspace(0.0, 1.0, 400)[:, None]
+    fine = np.linspace(-np.pi, np.pi, 721)[:-1]
+    entered = np.array(
+        [distances(TARGET + shares * turned(PLACE, one), grown).min(initial=1.0) < 0.0 for one in fine]
+    )
+    nearby = np.stack([np.roll(entered, k) for k in range(-4, 5)])
+    for bearing, all_, any_ in zip(fine, nearby.all(axis=0), nearby.any(axis=0), strict=True):
+        if all_ or not any_:
+            assert _hidden(arcs, bearing) is bool(all_)
+
+
+def test_a_box_around_the_target_hides_nothing_and_a_closed_wall_all():
+    east = np.array([[1.0, 0.0]])
+    assert box_arcs(TARGET, PLACE, Boxes(TARGET[None], np.ones((1, 3)), east), CLEAR) == []
+    plate = Boxes(TARGET[None] + (0.0, 0.0, 3.0), np.array([[9.0, 9.0, 0.1]]), east)
+    arcs = box_arcs(TARGET, PLACE, plate, CLEAR)
+    assert all(_hidden(arcs, bearing) for bearing in np.linspace(-3.1, 3.1, 50))
+    assert way_out(0.5, arcs, left=True) == 0.0

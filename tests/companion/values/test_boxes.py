@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from companion.values.boxes import BoxIndex, Boxes, beside, distances
+from companion.values.boxes import Boxes, BoxIndex, beside, distances
 from companion.values.horizon import Array
 
 

@@ -1,4 +1,4 @@
-"""Planes between plans and boxes: a plan that keeps its rows is clear of the box, and the committed one does."""
+"""Planes between plans and boxes: a plan that keeps its rows is clear, and the committed one keeps them."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_rows_of_boxes_have_forces_of_their_own_and_do_not_move() -> None:
     others = NOBODY._replace(boxes=wall, from_boxes=0.5)
     for epoch in range(1, 12):
         if kept_plan.turn(EPOCH + epoch * LENGTH):
-            replan(kept_plan, HERE + (4.0, 0.0, 0.0), others)
+            replan(kept_plan, HERE + np.array([4.0, 0.0, 0.0]), others)
     rest = kept_plan.own()[-1, 2]
     assert rest[0] == pytest.approx(1.4, abs=0.02)
     assert rest[1:] == pytest.approx(HERE[1:], abs=1e-2)
