@@ -15,6 +15,7 @@ from companion.config.estimation import TrackConfig
 from companion.config.flight import GroundMessagesConfig, GuardConfig, RatesConfig, TrackingConfig
 from companion.config.formation import FormationConfig, Nearest
 from companion.config.obstacles import (
+    MOST_OBSTACLES,
     Moving,
     MovingPost,
     MovingSphere,
@@ -100,7 +101,7 @@ class CompanionConfig(Settings):
         le=100.0,
         description="m: at this distance from the target its force begins; with target_d_min",
     )
-    obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed obstacles")
+    obstacles: tuple[Obstacle, ...] = Field((), max_length=MOST_OBSTACLES, description="fixed obstacles")
     moving: tuple[Moving, ...] = Field(
         (), max_length=100, description="senders on the swarm link that are obstacles, and their sizes"
     )

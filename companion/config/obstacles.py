@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import atan2, degrees, hypot
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from companion.values.settings import Positive, Settings
 
@@ -14,7 +14,10 @@ _Duration = Annotated[int, Field(ge=0, le=60_000_000)]
 _Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
 
 
-Size = Annotated[float, Field(gt=0.0, le=1000.0)]
+_MOST_M = 1000.0
+Size = Annotated[float, Field(gt=0.0, le=_MOST_M)]
+MOST_OBSTACLES = 20_000
+"""Largest number of fixed obstacles."""
 
 
 class Sphere(Settings):
@@ -56,6 +59,14 @@ class Wall(Settings):
     )
     thickness: Size = Field(0.2, description="m")
     height: Size = Field(100.0, description="m above the fleet origin; its lower end is at 0")
+
+    @model_validator(mode="after")
+    def _check_length(self) -> Wall:
+        (x0, y0), (x1, y1) = self.ends
+        length = hypot(x1 - x0, y1 - y0)
+        if not 0.0 < length <= _MOST_M:
+            raise ValueError(f"ends are {length:g} m apart; allowed: more than 0, up to {_MOST_M:g} m")
+        return self
 
     @property
     def box(self) -> Box:

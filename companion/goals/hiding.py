@@ -1,9 +1,9 @@
 """Bearings from which an obstacle or a vehicle hides the target, and the way out of them.
 
 An occluder is a part of a vertical cylinder between two heights. Seen from the target it covers an arc of
-bearings, if the ray to the camera passes it at its height. Those of boxes are found by rays 2° apart. A camera
-inside such an arc is turned towards the nearest bearing outside all of them, in proportion to how far that is.
-This is a part of the destination's turn, not a constraint.
+bearings, if the ray to the camera passes it at its height. Arcs of boxes are found by rays 2° apart. A camera
+inside such an arc is turned towards the nearest bearing outside all of them, in proportion to how far that
+is. This is a part of the destination's turn, not a constraint.
 """
 
 from __future__ import annotations

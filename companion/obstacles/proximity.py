@@ -20,7 +20,7 @@ from companion.obstacles.static import Axes
 from companion.values.horizon import Array
 from mavlink_bridge.messages import ObstacleDistance, Source
 
-FIRST_ID = 10_000
+FIRST_ID = 1_000_000
 """Ids of posts begin here: above those of fixed obstacles."""
 _FROM_NORTH = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_LOCAL_NED)
 """Frames in which angles are relative to north; in MAV_FRAME_BODY_FRD they are relative to the nose."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from outrider.errors import InputError
-from outrider.scenarios.feasibility import obstacles_to
-from outrider.simulation.preparation import prepared
+from outrider.scenarios.feasibility import check_drawn, obstacles_to
+from outrider.scenarios.starts import starts
+from outrider.simulation.preparation import measured, prepared
 from tests.outrider.shipped import FIREFLY, SCENARIOS, scenario
 
 
@@ -18,6 +20,7 @@ def test_every_shipped_scenario_can_work(name: str) -> None:
 
 
 POINTS = {"kind": "points", "jitter": 0.0}
+BOX = {"kind": "box", "at": [9, 0, 5], "size": [2, 2, 2]}
 GOTO: dict[str, Any] = {"task": "goto", "vehicles": 2}
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "starts in each other": (
@@ -44,6 +47,42 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         },
         "has no room for 2 vehicles that keep d_min = 8 m",
     ),
+    "a start inside a box": (
+        {
+            "starts": {**POINTS, "at": [[0, 0, 5], [9, 0, 5]], "goals": [[-5, 0, 5], [-9, 5, 5]]},
+            "obstacles": [{"kind": "sphere", "at": [0, 9, 5], "radius": 1}, BOX],
+        },
+        "vehicle 12 starts at [9, 0, 5] inside obstacles[1], a box at [9, 0, 5]; allowed: at least"
+        " d_min_obstacle = 0.5 m from it",
+    ),
+    "a start above a box": (
+        {
+            "starts": {**POINTS, "at": [[0, 0, 8], [9, 0, 8]], "goals": [[-5, 0, 5], [-9, 5, 5]]},
+            "obstacles": [BOX],
+        },
+        "vehicle 12 starts at [9, 0, 8] inside obstacles[0]",
+    ),
+    "a goal at a wall": (
+        {
+            "starts": {**POINTS, "at": [[0, 0, 5], [9, 0, 5]], "goals": [[-5, 0, 5], [-9, 5, 5]]},
+            "obstacles": [{"kind": "wall", "ends": [[-5.5, -5], [-5.5, 5]]}],
+        },
+        "vehicle 11 has its goal at [-5, 0, 5] 0.40 m from obstacles[0], a wall from [-5.5, -5] to [-5.5, 5]",
+    ),
+    "a goal at a post": (
+        {
+            "starts": {**POINTS, "at": [[0, 0, 5], [9, 0, 5]], "goals": [[-5, 0, 5], [-9, 5, 5]]},
+            "obstacles": [{"kind": "post", "at": [-5, 1], "radius": 0.7}],
+        },
+        "vehicle 11 has its goal at [-5, 0, 5] 0.30 m from obstacles[0], a post at [-5, 1]",
+    ),
+    "a world that was not read": (
+        {
+            "starts": {**POINTS, "at": [[0, 0, 5], [9, 0, 5]], "goals": [[-5, 0, 5], [-9, 5, 5]]},
+            "world": "w.csv",
+        },
+        "world: w.csv was not read; allowed: in a scenario file only",
+    ),
 }
 
 
@@ -54,3 +93,23 @@ def test_what_cannot_work_is_refused_with_the_reason(what: str) -> None:
         prepared(scenario("obstacles", **{**GOTO, **changes}), "mine.yaml")
     assert str(error.value).startswith("mine.yaml: ")
     assert said in str(error.value)
+
+
+def test_a_start_and_a_goal_beside_obstacles_can_work_and_in_the_air_also_above_one() -> None:
+    places = {"at": [[0, 0, 8], [9, 0, 8]], "goals": [[-5, 0, 5], [9, 0, 8]]}
+    above = scenario("obstacles", **GOTO, starts={**POINTS, **places}, obstacles=[BOX], airborne=True)
+    assert not list(obstacles_to(above, FIREFLY.span))
+
+
+def test_a_start_that_its_jitter_moves_too_near_is_refused_for_that_seed() -> None:
+    """Of two seeds one draws a start beside the box, the other one that is clear of it."""
+    at = {"at": [[0, 0, 5], [7.45, 0, 5]], "goals": [[0, 5, 5], [5, 5, 5]]}
+    jittered = scenario("obstacles", **GOTO, starts={**POINTS, **at, "jitter": 0.4}, obstacles=[BOX])
+    flown = prepared(jittered, "mine.yaml")
+    drawn = [float(starts(jittered, seed, planar=False).positions[1, 0]) for seed in range(8)]
+    near = int(np.argmax(drawn))
+    assert drawn[near] > 7.5
+    with pytest.raises(InputError, match=rf"seed {near}: vehicle 12 starts at .* m from obstacles\[0\]"):
+        measured(flown, near)
+    clear = int(np.argmin(drawn))
+    check_drawn(jittered, clear, starts(jittered, clear, planar=False).positions)

@@ -10,7 +10,6 @@ from contextlib import closing, nullcontext, suppress
 from pathlib import Path
 from typing import Final
 
-import yaml
 from rich.console import Console
 
 from mavlink_bridge.clocks.clock import WallClock
@@ -26,7 +25,7 @@ from outrider.onboard.screen import Screen
 from outrider.onboard.terminal import Terminal
 from outrider.onboard.wiring import Wiring, wire
 from outrider.runs import names
-from outrider.runs.configuration import CONFIGURATION
+from outrider.runs.configuration import write_fly_config
 from outrider.runs.directories import new_directory
 from outrider.terminal.lines import say
 
@@ -56,10 +55,8 @@ def _live(asked: Request) -> int:
     wiring = wire(asked.endpoints, config.system, config.target, config.settings, WallClock(), asked.key)
     with closing(wiring), noted(_STOPS) as stops, suspending_signals_ignored():
         directory = new_directory(asked.out, f"fly-{config.system}")
-        document = config.model_dump(mode="json")
         try:
-            text = yaml.safe_dump(document, sort_keys=False)
-            (directory / CONFIGURATION).write_text(text, encoding="utf-8")
+            write_fly_config(directory, config)
         except OSError as error:
             raise InputError(f"--out {directory}: cannot be written: {error.strerror}") from None
         with closing(EventLog(directory, lambda: time.monotonic() - began)) as event_log:

@@ -18,7 +18,7 @@ from mavlink_bridge.frames import LocalFrame
 from outrider.planner.own_parts import TARGET
 from outrider.planner.values import Neighbour, Obstacle, Target, microseconds
 
-_FIRST_OBSTACLE_ID = 5000
+_FIRST_OBSTACLE_ID = 1_000_000
 """Ids of the caller's obstacles begin here: above those of configured ones."""
 _MAX_PLAN_DEVIATION_M = 1.0
 """A neighbour further than this (m) from its plan is not predicted by it, as in ``companion.obstacles``."""

@@ -32,6 +32,7 @@ from outrider.realtime.workers import ProcessResults
 from outrider.runs import names
 from outrider.runs.ground_truth import SAMPLE, Array
 from outrider.runs.outcome import Messages, Outcome, Punctuality
+from outrider.scenarios.feasibility import check_drawn
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.conductor import PREPARE_CAP, Conductor, Observation, Stage
 from outrider.simulation.disturbances import Event, events, strike_computer
@@ -71,6 +72,7 @@ class RealTimeFlight:
     ) -> None:
         self.scenario, self.seed = scenario, seed
         self.fleet = Fleet(scenario, vehicle, seed, logs)
+        check_drawn(scenario, seed, self.fleet.starts.positions)
         self.priority_told = ""
         self.outcome: Outcome
         self._directory = directory

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, Self
 
+import yaml
 from pydantic import BaseModel, ConfigDict
 
 from outrider.errors import Fault, InputError
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.scenarios.scenario import Scenario
+from outrider.scenarios.world_file import beside
 from outrider.yaml_files.yaml_file import load
 
 CONFIGURATION = "configuration.yaml"
@@ -21,6 +24,30 @@ class Resolved(BaseModel):
 
     seed: int
     scenario: Scenario
+
+    def with_files(self, folder: Path) -> Self:
+        """Return the configuration with the boxes of a world file in ``folder``."""
+        return self.model_copy(update={"scenario": self.scenario.with_files(folder)})
+
+
+def write_scenario(directory: Path, seed: int, scenario: Scenario) -> None:
+    """Write the configuration of a run of ``scenario`` to ``directory``; or raise OSError."""
+    obstacles, world = beside(scenario.obstacles, directory)
+    stated = scenario.model_copy(update={"obstacles": obstacles, "world": world})
+    _write(directory, {"seed": seed, "scenario": stated.model_dump(mode="json")})
+
+
+def write_fly_config(directory: Path, config: FlyConfig) -> None:
+    """Write the configuration of a run of ``outrider fly`` to ``directory``; or raise OSError."""
+    obstacles, world = beside(config.companion.obstacles, directory)
+    companion = config.companion.model_copy(update={"obstacles": obstacles})
+    stated = config.model_copy(update={"companion": companion, "world": world})
+    _write(directory, stated.model_dump(mode="json"))
+
+
+def _write(directory: Path, document: dict[str, Any]) -> None:
+    text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
+    (directory / CONFIGURATION).write_text(text, encoding="utf-8")
 
 
 def resolved(directory: Path, allowed: str, of_log: str | None = None) -> Resolved:

@@ -4,25 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
-from math import pi
+from math import ceil, pi
 
 import numpy as np
 
+from companion.config.obstacles import Obstacle, Wall
+from companion.obstacles.static import FIRST_ID, FixedObstacles
+from outrider.errors import InputError
 from outrider.scenarios.part import FIRST_SYSTEM
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import Array, places
 
 _DENSEST = pi / 18.0**0.5
 """Largest share of a volume that equal balls fill, 0.74."""
+_STEP_M = 0.1
+"""Distance between the places of the way up to a start that are checked."""
 
 
 def obstacles_to(scenario: Scenario, span: float) -> Iterator[str]:
     """Yield a sentence for each reason why the vehicles, ``span`` (m) from tip to tip, cannot fly it.
 
     They are: starts or goals nearer to each other than vehicles are wide, starts or goals outside the box
-    of the plans, and a box too small for all vehicles.
+    of the plans, a box too small for all vehicles, starts or goals nearer to an obstacle than its d_min, and
+    a world file that was not read.
     """
+    if scenario.world is not None:
+        yield f"world: {scenario.world} was not read; allowed: in a scenario file only"
     starts, goals = places(scenario)
+    yield from in_obstacles(starts, goals, scenario)
     for name, found in (("start", starts), ("have goals", goals)):
         if found is not None:
             yield from _too_near(name, found, span)
@@ -40,6 +49,53 @@ def obstacles_to(scenario: Scenario, span: float) -> Iterator[str]:
             f"companion.limits: the box of {sides} m has no room for {scenario.vehicles} vehicles that keep"
             f" d_min = {scenario.d_min:g} m; allowed: a larger box"
         )
+
+
+def in_obstacles(starts: Array, goals: Array | None, scenario: Scenario) -> Iterator[str]:
+    """Yield a sentence for each of ``starts`` (K, 3) and ``goals``, m, too near to a fixed obstacle.
+
+    The way up to a start from the ground counts with it.
+    """
+    if not scenario.obstacles:
+        return
+    fixed = FixedObstacles(scenario.obstacles)
+    for k, place in enumerate(starts):
+        lowest = place[2] if scenario.airborne else 0.0
+        climb = np.repeat(place[None], 1 + ceil(abs(place[2] - lowest) / _STEP_M), axis=0)
+        climb[:, 2] = np.linspace(place[2], lowest, len(climb))
+        yield from _near_obstacle(f"vehicle {FIRST_SYSTEM + k} starts", climb, scenario, fixed)
+    for k, place in enumerate(() if goals is None else goals):
+        yield from _near_obstacle(f"vehicle {FIRST_SYSTEM + k} has its goal", place[None], scenario, fixed)
+
+
+def check_drawn(scenario: Scenario, seed: int, starts: Array) -> None:
+    """Raise InputError if ``starts`` (K, 3), m, as drawn with ``seed``, are too near to an obstacle."""
+    found = list(in_obstacles(starts, None, scenario))
+    if found:
+        raise InputError(*(f"seed {seed}: {what}" for what in found))
+
+
+def _near_obstacle(what: str, points: Array, scenario: Scenario, fixed: FixedObstacles) -> Iterator[str]:
+    """Yield a sentence if one of ``points`` (n, 3) is too near to an obstacle."""
+    obstacles, least = scenario.obstacles, scenario.d_min_obstacle
+    for index in (name - FIRST_ID for name in fixed.around(points, least).ids):
+        one = obstacles[index]
+        apart = float(FixedObstacles([one]).distance(points).min())
+        if apart < least:
+            at = ", ".join(f"{value:g}" for value in np.round(points[0], 2))
+            where = "inside" if apart < 0.0 else f"{apart:.2f} m from"
+            yield (
+                f"{what} at [{at}] {where} obstacles[{index}], {_described(one)};"
+                f" allowed: at least d_min_obstacle = {least:g} m from it"
+            )
+            return
+
+
+def _described(obstacle: Obstacle) -> str:
+    """Return the kind of an obstacle, and where it is."""
+    if isinstance(obstacle, Wall):
+        return "a wall from [{:g}, {:g}] to [{:g}, {:g}]".format(*obstacle.ends[0], *obstacle.ends[1])
+    return f"a {obstacle.kind} at [{', '.join(f'{value:g}' for value in obstacle.at)}]"
 
 
 def _too_near(what: str, found: Array, span: float) -> Iterator[str]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from companion.config import CompanionConfig
 from companion.values.settings import Settings
 from mavlink_bridge.frames import FleetFrame
+from outrider.scenarios.world_file import WORLD, WorldName, with_world
 
 System = Annotated[int, Field(ge=0, le=250)]
 """System id; 0: not given yet. Ids above 250 are those of ground stations."""
@@ -83,7 +85,19 @@ class FlyConfig(Settings):
     clock_error: ClockError | None = Field(
         None, description="for tests in simulations only: an error of the companion's clock; null: none"
     )
+    world: WorldName | None = Field(None, description=WORLD.replace("obstacles", "companion.obstacles"))
     companion: CompanionConfig = CompanionConfig()
+
+    def with_files(self, folder: Path) -> Self:
+        """Return the configuration with the boxes of the file ``world`` in ``folder`` as obstacles.
+
+        Raises InputError with the faults of that file.
+        """
+        if self.world is None:
+            return self
+        found = with_world(self.companion.obstacles, self.world, folder)
+        companion = self.companion.model_copy(update={"obstacles": found})
+        return self.model_copy(update={"companion": companion, "world": None})
 
     @property
     def certified(self) -> bool:

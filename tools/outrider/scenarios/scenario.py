@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from pathlib import Path
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from companion.config.companion import CompanionConfig, Moving, Obstacle
+from companion.config.obstacles import MOST_OBSTACLES
 from outrider.scenarios.cameras import CameraConfig, VehicleCamera, camera_faults
 from outrider.scenarios.faults import Clocks, FaultPart
 from outrider.scenarios.links import ROLES, AllLinks, PartitionPart
@@ -25,6 +27,7 @@ from outrider.scenarios.places import (
     Starts,
     Target,
 )
+from outrider.scenarios.world_file import WORLD, WorldName, with_world
 from sitl.config.gains import ResponseName
 from sitl.environment.weather import WeatherConfig
 
@@ -107,7 +110,10 @@ class Scenario(Part):
         "land", description="what the operator orders in the end: land here, or return to the start and land"
     )
     target: Target = Field(description="what is escorted or faced: fixed, on a path, or recorded")
-    obstacles: tuple[Obstacle, ...] = Field((), max_length=500, description="fixed, known to all companions")
+    obstacles: tuple[Obstacle, ...] = Field(
+        (), max_length=MOST_OBSTACLES, description="fixed, known to all companions"
+    )
+    world: WorldName | None = Field(None, description=WORLD)
     moving: tuple[MovingPart, ...] = Field(
         (), max_length=50, description="obstacles that move; their system ids are 190 and so on"
     )
@@ -132,6 +138,14 @@ class Scenario(Part):
     clocks: Clocks = Clocks()
     timing: Timing = Timing()
     companion: CompanionConfig = CompanionConfig()
+
+    def with_files(self, folder: Path) -> Self:
+        """Return the scenario with the boxes of the file ``world`` in ``folder`` among its obstacles.
+
+        Raises InputError with the faults of that file.
+        """
+        found = with_world(self.obstacles, self.world, folder)
+        return self if self.world is None else self.model_copy(update={"obstacles": found, "world": None})
 
     @property
     def has_goal(self) -> bool:

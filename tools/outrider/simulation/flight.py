@@ -16,6 +16,7 @@ from companion.obstacles.static import FixedObstacles
 from mavlink_bridge.loops.lockstep import StepObserver
 from outrider.runs.ground_truth import GroundTruth, Limits
 from outrider.runs.outcome import Messages, Outcome
+from outrider.scenarios.feasibility import check_drawn
 from outrider.scenarios.scenario import Scenario
 from outrider.scene.changes import Change
 from outrider.simulation.conductor import Conductor, Observation, Stage
@@ -57,6 +58,7 @@ class Flight:
     ) -> None:
         self.scenario, self.seed = scenario, seed
         self.fleet = fleet = Fleet(scenario, vehicle, seed, logs)
+        check_drawn(scenario, seed, self.fleet.starts.positions)
         self.systems = fleet.systems
         self.target = fleet.target()
         self.moving = fleet.moving()

@@ -8,12 +8,10 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-import yaml
-
 from outrider.interruption import interruptible
 from outrider.resources import config_root
 from outrider.runs import figures, names
-from outrider.runs.configuration import CONFIGURATION
+from outrider.runs.configuration import write_scenario
 from outrider.runs.directories import new_directory
 from outrider.runs.flight_file import write_flight, write_plan_times, write_plans
 from outrider.runs.outcome import Outcome
@@ -62,10 +60,7 @@ def fly(
     """
     with interruptible(f"{directory} keeps the configuration and the logs up to there, but no summary"):
         scenario = prepared.scenario
-        resolved = {"seed": seed, "scenario": scenario.model_dump(mode="json")}
-        (directory / CONFIGURATION).write_text(
-            yaml.safe_dump(resolved, sort_keys=False, allow_unicode=True), encoding="utf-8"
-        )
+        write_scenario(directory, seed, scenario)
         if pace.real_time:
             outcome, cost = _flown_in_real_time(prepared, seed, progress, directory, pace, show)
         else:

@@ -11,7 +11,7 @@ import sys
 from bisect import bisect_right
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Protocol, Self, TypeVar, runtime_checkable
 
 from pydantic import BaseModel, ValidationError
 
@@ -24,6 +24,15 @@ from outrider.yaml_files.tree import Flaw, Mapping, parse, plain
 
 Model = TypeVar("Model", bound=BaseModel)
 
+
+@runtime_checkable
+class NamesFiles(Protocol):
+    """Model that may name further files."""
+
+    def with_files(self, folder: Path) -> Self:
+        """Return the model with the contents of the files that it names, relative to ``folder``."""
+
+
 MOST_BYTES = 1 << 20
 MOST_FAULTS = 100
 """Largest number of faults that are shown; the rest is counted."""
@@ -32,8 +41,12 @@ MOST_WORDING = 1000
 
 
 def load(path: Path, model: type[Model]) -> Model:
-    """Load the file at ``path`` as a ``model``; raise InputError with every fault of the file."""
-    return read(_bytes_of(path), str(path), model)
+    """Load the file at ``path`` as a ``model``, with the files that it names.
+
+    Raises InputError with every fault of the file, or of one that it names.
+    """
+    found = read(_bytes_of(path), str(path), model)
+    return found.with_files(path.parent) if isinstance(found, NamesFiles) else found
 
 
 def read(data: bytes, name: str, model: type[Model]) -> Model:
