@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from companion.avoidance.certified.detour import Detour, Subgoal
-from companion.avoidance.certified.visibility_graph import Discs, free, way
+from companion.avoidance.certified.visibility_graph import Discs, Rectangles, free, way
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.plans import EPOCH
@@ -81,6 +81,77 @@ def test_out_of_a_closed_ring_there_is_no_way() -> None:
     assert way(np.zeros(2), np.array([12.0, 0.0]), opened, LOW, HIGH) is not None
     # The box closes the gap of the ring.
     assert way(np.zeros(2), np.array([-4.0, 9.0]), opened, LOW, np.array([3.0, 30.0])) is None
+
+
+def halls(seed: int) -> tuple[Array, Array, Discs]:
+    """Start and goal outside of six discs and eight rectangles, of which several overlap."""
+    random = np.random.default_rng(seed)
+    angles = random.uniform(-np.pi, np.pi, 8)
+    discs = Discs(
+        random.uniform(-10.0, 10.0, (6, 2)),
+        random.uniform(0.5, 2.0, 6),
+        Rectangles(
+            random.uniform(-10.0, 10.0, (8, 2)),
+            10.0 ** random.uniform(-1.0, 0.5, (8, 2)),
+            np.stack([np.cos(angles), np.sin(angles)], axis=1),
+            random.uniform(0.3, 1.0, 8),
+        ),
+    )
+    while True:
+        ends = random.uniform(-12.0, 12.0, (2, 2))
+        if (room(ends, discs) > 0.5).all():
+            return ends[0], ends[1], discs
+
+
+def room(places: Array, discs: Discs) -> Array:
+    """Distances (k,) of places (k, 2) from the nearest disc or rectangle, by clipping; negative within."""
+    round_ = np.linalg.norm(places[:, None] - discs.centres, axis=-1) - discs.radii
+    found = [round_]
+    for centre, half, (cos, sin), radius in zip(*discs.rectangles, strict=True):
+        own = (places - centre) @ np.array([[cos, -sin], [sin, cos]])
+        found.append((np.linalg.norm(own - np.clip(own, -half, half), axis=1) - radius)[:, None])
+    return np.concatenate(found, axis=1).min(axis=1)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_line_is_free_exactly_where_all_of_its_points_are(seed: int) -> None:
+    start, _, discs = halls(seed)
+    ends = np.random.default_rng(seed).uniform(-12.0, 12.0, (200, 2))
+    shares = np.linspace(0.0, 1.0, 800)[:, None]
+    least = np.array([room(start + shares * (end - start), discs).min() for end in ends])
+    found = free(start, ends, discs)
+    assert found[least > 0.02].all()
+    assert not found[least < -1e-6].any()
+    assert found.any()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_way_among_rectangles_enters_none_and_is_as_long_in_both_directions(seed: int) -> None:
+    start, goal, discs = halls(seed)
+    there, back = way(start, goal, discs, LOW, HIGH), way(goal, start, discs, LOW, HIGH)
+    assert (there is None) == (back is None)
+    if there is None or back is None:
+        return
+    assert room(along(start, there), discs).min() >= -1e-6
+    assert length(start, there) == pytest.approx(length(goal, back))
+    assert (len(there) == 1) == bool(free(start, goal[None], discs)[0])
+
+
+def test_round_a_wall_the_way_is_near_its_end() -> None:
+    wall = Rectangles(*np.array([[[1.0, 2.0]], [[0.1, 4.0]], [[1.0, 0.0]]]), np.array([1.0]))
+    found = way(np.array([-4.0, 0.0]), np.array([6.0, 0.0]), NOTHING._replace(rectangles=wall), LOW, HIGH)
+    assert found is not None
+    # Tangents to the two corners at the near end, of the circles of 1 m about them.
+    shortest = 2.0 * np.hypot(4.9, 3.0)
+    assert shortest <= length(np.array([-4.0, 0.0]), found) <= 1.04 * shortest
+    assert found[:, 1].min() == pytest.approx(-3.0, abs=0.1)
+
+
+def test_a_rectangle_that_holds_an_end_is_reduced() -> None:
+    wall = Rectangles(*np.array([[[0.0, 0.0]], [[0.1, 4.0]], [[1.0, 0.0]]]), np.array([1.0]))
+    found = way(np.array([-0.5, 0.0]), np.array([5.0, 0.0]), NOTHING._replace(rectangles=wall), LOW, HIGH)
+    assert found is not None
+    assert room(along(np.array([-0.5, 0.0]), found), NOTHING._replace(rectangles=wall)).min() > -1.0
 
 
 def test_without_a_stall_the_goal_is_the_goal_and_a_free_line_ends_a_way() -> None:
