@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from companion.avoidance.field.methods import Influence, Method, Scene
-    from companion.config.obstacles import Post, Sphere
+    from companion.config.obstacles import Box, Post, Sphere, Wall
     from outrider import sim
     from outrider.errors import InputError, OutriderError
     from outrider.flights.flight import Flight
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Box",
     "Flight",
     "Influence",
     "InputError",
@@ -45,6 +46,7 @@ __all__ = [
     "Step",
     "Surface",
     "Target",
+    "Wall",
     "__version__",
     "fly",
     "scenario",
@@ -52,6 +54,7 @@ __all__ = [
 ]
 
 _PLACES = {
+    "Box": "companion.config.obstacles:Box",
     "Flight": "outrider.flights.flight:Flight",
     "Influence": "companion.avoidance.field.methods:Influence",
     "InputError": "outrider.errors:InputError",
@@ -71,6 +74,7 @@ _PLACES = {
     "Step": "outrider.planner.values:Step",
     "Surface": "outrider.planner.own_parts:OwnSurface",
     "Target": "outrider.planner.values:Target",
+    "Wall": "companion.config.obstacles:Wall",
     "fly": "outrider.flights.flying:fly",
     "scenario": "outrider.flights.flying:scenario",
 }

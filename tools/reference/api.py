@@ -26,6 +26,8 @@ _SETTINGS = {
     "PlannerConfig": "companion.md",
     "Scenario": "scenario.md",
     "Post": "companion.md",
+    "Box": "companion.md",
+    "Wall": "companion.md",
     "Sphere": "companion.md",
     "VehicleConfig": "vehicle.md",
 }
