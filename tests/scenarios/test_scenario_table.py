@@ -35,6 +35,8 @@ ROWS = (
     Row("walk, 20 s", "walk", {"cap_s": 20.0}, standoff_p95_m=0.5, slow=True),
     # Carried on straight, its target would be 1.6 m beside its bend after a horizon, and this 3 to 12 m.
     Row("run, 20 s", "run", {"cap_s": 20.0}, standoff_p95_m=1.0, slow=True),
+    Row("boxes", "boxes", seed=2, within_s=15.0, slow=True),
+    Row("boxes, certified", "boxes", {"companion": {"avoidance": "certified"}}, within_s=12.0, slow=True),
     Row("antipodal for ten", "antipodal", {"vehicles": 10}, within_s=25.0, slow=True),
     Row("escort, 10 s", "escort", {"target": {"duration_s": 10.0}}, standoff_p95_m=2.0),
     # 16 m from rest to rest with 2 m/s² take 5.7 s: a cap of 5 s is never enough.

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from companion.config.obstacles import MOST_OBSTACLES, Box, Post, Wall
 from outrider.errors import InputError
+from outrider.resources import config_root
+from outrider.runs.configuration import configured, write_fly_config, write_scenario
 from outrider.scenarios.fly_config import FlyConfig
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.world_file import beside, boxes_of, with_world, write_world
@@ -22,6 +24,7 @@ boxes = st.builds(
     st.tuples(sizes, sizes, sizes),
     angles,
 )
+BOXES = config_root() / "scenarios" / "boxes.yaml"
 GOOD = "1,2,3,4,5,6\n"
 
 
@@ -108,9 +111,9 @@ def test_any_bytes_are_boxes_or_an_error_with_places(data):
 
 def test_a_scenario_and_a_companion_have_the_boxes_of_the_file_beside_them(tmp_path: Path):
     (tmp_path / "w.csv").write_text(GOOD)
-    scenario = Path("config/scenarios/boxes.yaml").read_text()
+    scenario = BOXES.read_text()
     (tmp_path / "s.yaml").write_text(scenario + "world: w.csv\n")
-    found, plain = load(tmp_path / "s.yaml", Scenario), load(Path("config/scenarios/boxes.yaml"), Scenario)
+    found, plain = load(tmp_path / "s.yaml", Scenario), load(BOXES, Scenario)
     assert found.obstacles == (*plain.obstacles, box(1, 2, 3, 4, 5, 6))
     assert found.world is None
     (tmp_path / "c.yaml").write_text(
@@ -130,3 +133,21 @@ def test_a_long_list_that_ends_with_boxes_gets_a_file_and_comes_back_in_order(tm
     assert stated == many[:3]
     assert with_world(stated, name, tmp_path) == many
     assert beside(many[:20], tmp_path) == (many[:20], None)
+
+
+@pytest.mark.parametrize("count", [3, 150])
+def test_a_run_directory_has_all_boxes_wherever_it_is_moved(tmp_path: Path, count: int):
+    added = tuple(box(k, 2, 3, 4, 5, 6, 7) for k in range(count))
+    scenario = load(BOXES, Scenario)
+    scenario = scenario.model_copy(update={"obstacles": (*scenario.obstacles, *added)})
+    (tmp_path / "run").mkdir()
+    write_scenario(tmp_path / "run", 5, scenario)
+    moved = (tmp_path / "run").rename(tmp_path / "moved")
+    assert configured(moved, "allowed: a run", None).scenario == scenario
+    (tmp_path / "c.yaml").write_text("target: 9\norigin: {latitude: 47.0, longitude: 8.0, altitude: 0.0}\n")
+    config = load(tmp_path / "c.yaml", FlyConfig)
+    companion = config.companion.model_copy(update={"obstacles": added})
+    config = config.model_copy(update={"companion": companion})
+    (tmp_path / "fly").mkdir()
+    write_fly_config(tmp_path / "fly", config)
+    assert load(tmp_path / "fly" / "configuration.yaml", FlyConfig) == config
