@@ -1,4 +1,4 @@
-"""Bodies that hide what is behind them: balls, columns, and the ground. Site NED, metres."""
+"""Bodies that hide what is behind them: balls, columns, boxes, and the ground. Site NED, metres."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 Point = tuple[float, float, float]
+Array = NDArray[np.float64]
 
 
 class Body(Protocol):
@@ -73,6 +77,44 @@ class Column(NamedTuple):
     def moved(self, by: Point) -> Column:
         """Return the cylinder with its axis moved horizontally."""
         return self._replace(axis=(self.axis[0] + by[0], self.axis[1] + by[1]))
+
+
+class Blocks(NamedTuple):
+    """M boxes with upright sides, around ``centres`` (M, 3).
+
+    ``halves`` (M, 3): half of their lengths along their own axes, of which x and y are level; ``turns``
+    (M, 2): cosine and sine of the heading of their x axes, from north to east.
+    """
+
+    centres: Array
+    halves: Array
+    turns: Array
+
+    def hides(self, eye: Point, point: Point) -> bool:
+        """Return whether the line from ``eye`` to ``point`` crosses any of the boxes.
+
+        A part of the line lies between each two opposite sides of a box, and in the box where the three parts
+        overlap. A line along a side does not cross it.
+        """
+        begin = self._own(np.subtract(eye, self.centres))
+        step = self._own(np.broadcast_to(np.subtract(point, eye), self.centres.shape))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            enters = (-np.copysign(self.halves, step) - begin) / step
+            leaves = (np.copysign(self.halves, step) - begin) / step
+        along, between = step == 0.0, np.abs(begin) < self.halves
+        enters = np.where(along, np.where(between, -np.inf, np.inf), enters)
+        leaves = np.where(along, np.inf, leaves)
+        first, last = enters.max(axis=1), leaves.min(axis=1)
+        return bool((np.maximum(first, 0.0) < np.minimum(last, 1.0)).any())
+
+    def moved(self, by: Point) -> Blocks:
+        """Return the boxes with their centres moved."""
+        return self._replace(centres=self.centres + by)
+
+    def _own(self, offsets: Array) -> Array:
+        """Return ``offsets`` (M, 3) in the axes of the boxes."""
+        (north, east, down), (cosine, sine) = offsets.T, self.turns.T
+        return np.stack([cosine * north + sine * east, cosine * east - sine * north, down], axis=1)
 
 
 class Ground(NamedTuple):

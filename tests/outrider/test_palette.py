@@ -122,6 +122,8 @@ def test_colours_are_stated_in_one_place() -> None:
         *STYLES,
         "data.js",
         "glyphs.js",
+        "blocks.js",
+        "order.js",
         "scene.js",
         "vehicles.js",
         "charts.js",

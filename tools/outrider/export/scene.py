@@ -7,18 +7,19 @@ viewer that jumps to any time therefore shows all bodies, and only frames and tr
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import cos, radians, sin
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from companion.config.companion import Obstacle
-from companion.config.obstacles import Post
+from companion.config.obstacles import Box, Post, Sphere
 from outrider.export import foxglove, foxglove_schemas, multirotor
 from outrider.export.attitude import quaternions, up_vectors
 from outrider.export.foxglove import Color, Json
 from outrider.export.mcap_file import Entry, entry
 from outrider.palette import OBSTACLE, TARGET, hex_of, rgb
 from outrider.runs.arrays import Array, Motion
+from outrider.scenarios.footprints import without_walls
 from outrider.scenarios.moving import MovingPostPart
 from outrider.scenarios.scenario import Scenario
 from outrider.scene.airframe import Airframe, airframe
@@ -62,7 +63,7 @@ def bodies(stage: Stage) -> Iterator[Entry]:
     if scenario.obstacles:
         solid = [
             foxglove.entity(now, FLEET, f"obstacle-{k}", _obstacle(one, scenario.d_min_obstacle))
-            for k, one in enumerate(scenario.obstacles)
+            for k, one in enumerate(without_walls(scenario.obstacles))
         ]
         yield reported("obstacles", *solid)
     if scenario.moving:
@@ -151,8 +152,13 @@ def _target(now: int, scenario: Scenario) -> Json:
     return foxglove.entity(now, "target", "target", {"spheres": spheres}, locked=True)
 
 
-def _obstacle(one: Obstacle, d_min: float) -> dict[str, list[Json]]:
-    """Return a ball, or a post from the ground up, and the shell that no vehicle's centre may enter."""
+def _obstacle(one: Sphere | Post | Box, d_min: float) -> dict[str, list[Json]]:
+    """Return a ball, a box, or a post from the ground up, and its shell, which no vehicle's centre may enter.
+
+    The shell of a box is wider than d_min at its edges, which are not round.
+    """
+    if isinstance(one, Box):
+        return _box(one, d_min)
     if isinstance(one, Post):
         return _post((one.at[0], one.at[1], 0.5 * one.height), one.radius, one.height, d_min)
     return _ball(one.at, one.radius, d_min)
@@ -166,6 +172,18 @@ def _moving(now: int, scenario: Scenario) -> Iterator[Json]:
         else:
             shapes = _ball((0.0, 0.0, 0.0), one.radius, scenario.d_min_obstacle)
         yield foxglove.entity(now, f"moving-{system}", f"moving-{system}", shapes, locked=True)
+
+
+def _box(box: Box, d_min: float) -> dict[str, list[Json]]:
+    half = 0.5 * radians(box.yaw_deg)
+    turned = (cos(half), 0.0, 0.0, sin(half))
+    sizes = ((0.0, SOLID_COLOR), (2.0 * d_min, SOLID_COLOR.faint(SHELL)))
+    return {
+        "cubes": [
+            foxglove.cube(box.at, [side + wider for side in box.size], color, turned)
+            for wider, color in sizes
+        ]
+    }
 
 
 def _post(middle: foxglove.Point, radius: float, height: float, d_min: float) -> dict[str, list[Json]]:

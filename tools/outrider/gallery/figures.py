@@ -90,7 +90,12 @@ def _corners(scene: Mapping[str, Any]) -> NDArray[np.float64]:
     found += [np.array(at, dtype=np.float64) for at in scene["target"]]
     for east, north, radius in scene["obstacles"]:
         found += [np.array([east - radius, north - radius]), np.array([east + radius, north + radius])]
-    return np.array(found)
+    return np.vstack([np.array(found), _boxes(scene).reshape(-1, 2)])
+
+
+def _boxes(scene: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Return the corners (M, 4, 2), m, of boxes and walls; journals of older versions have none."""
+    return np.array(scene.get("boxes", ()), dtype=np.float64).reshape(-1, 4, 2)
 
 
 def _top(panels: Sequence[Panel], chart: Chart) -> float:
@@ -131,10 +136,12 @@ def _elsewhere(run: Run) -> str:
 
 
 def _paths(axes: Axes, scene: Mapping[str, Any]) -> None:
+    from matplotlib.collections import PolyCollection
     from matplotlib.patches import Circle
 
     for east, north, radius in scene["obstacles"]:
         axes.add_patch(Circle((east, north), radius, color=OBSTACLE, lw=0.0))
+    axes.add_collection(PolyCollection(list(_boxes(scene)), color=OBSTACLE, lw=0.0))
     for way, radius in zip(scene["moving"], scene["moving_radius"], strict=True):
         axes.plot(*np.array(way).T, color=OBSTACLE, lw=0.8)
         axes.add_patch(Circle(way[-1], radius, fc="0.8", ec=OBSTACLE, lw=0.8))

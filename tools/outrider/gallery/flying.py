@@ -9,6 +9,7 @@ import numpy as np
 from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
 from outrider.runs.summary import standoff_errors
+from outrider.scenarios.footprints import circles, rectangles
 from outrider.simulation.preparation import measured
 from outrider.sweep.flying import prepared
 from outrider.sweep.tasks import Task
@@ -30,8 +31,8 @@ def _scene(outcome: Outcome) -> dict[str, Any]:
     Times (T,) since the goal event (s); horizontal positions (T, K, 2) and the target's path (≤ T,
     2), without the times at which it is absent (m); the least separation (T,), m, or −1 where there is none;
     ``standoff``, of escorts only: median and largest of the vehicles' distances (T, 2), m, from the surface;
-    obstacles as (east, north, radius); paths of moving obstacles (M, T, 2) and their radii; the number of
-    vehicles without bystanders; d_min (m).
+    round obstacles as (east, north, radius), and corners of boxes and walls (M, 4, 2); paths of moving
+    obstacles (M, T, 2) and their radii; the number of vehicles without bystanders; d_min (m).
     """
     start = outcome.clock_start or 0
     samples = outcome.truth.samples(start, outcome.clock_end)
@@ -45,7 +46,8 @@ def _scene(outcome: Outcome) -> dict[str, Any]:
         "separation": np.round(np.where(np.isfinite(nearest), nearest, -1.0), 2).tolist(),
         "standoff": _standoff(outcome, samples),
         "target": np.round(target[np.isfinite(target).all(axis=1)][:, :2], 2).tolist(),
-        "obstacles": [[*one.at[:2], one.radius] for one in outcome.scenario.obstacles],
+        "obstacles": [list(circle) for circle in circles(outcome.scenario.obstacles)],
+        "boxes": np.round(rectangles(outcome.scenario.obstacles), 2).tolist(),
         "moving": np.round(samples.moving[::_SAMPLES_PER_POINT, :, :2].swapaxes(0, 1), 2).tolist(),
         "moving_radius": [one.radius for one in outcome.scenario.moving],
         "vehicles": outcome.scenario.vehicles,

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.obstacles.moving import MovingObstacles
-from companion.obstacles.static import FixedObstacles
 from outrider.report.run import Array, Motions
+from outrider.runs.surfaces import Surfaces
 from outrider.scenarios.scenario import Scenario
 
 _MIN_HEIGHT = 0.2
@@ -44,10 +44,8 @@ def to_obstacles(motions: Motions, scenario: Scenario) -> Array:
 
     It is infinite without obstacles.
     """
-    found = np.full(motions.position.shape[:2], np.inf)
-    fixed, moving = FixedObstacles(scenario.obstacles), MovingObstacles(scenario.moving_known)
-    if len(fixed):
-        found = np.minimum(found, fixed.distance(motions.position).min(axis=-1))
+    moving = MovingObstacles(scenario.moving_known)
+    found = Surfaces(scenario.obstacles).nearest(motions.position)
     if len(moving) and motions.moving.shape[1] == len(moving):
         found = np.fmin(found, np.fmin.reduce(moving.distance(motions.position, motions.moving), axis=-1))
     return found

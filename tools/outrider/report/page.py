@@ -24,6 +24,8 @@ SCRIPTS = (
     "cursor.js",
     "camera.js",
     "glyphs.js",
+    "blocks.js",
+    "order.js",
     "extent.js",
     "scene.js",
     "vehicles.js",

@@ -11,6 +11,7 @@ from outrider.report.run import Array, Motions, Run
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import starts
 from outrider.scene.airframe import HEXAROTOR, airframe
+from outrider.scene.scene import Solid, solids
 
 _MAX_SPAN = 100.0
 
@@ -19,8 +20,9 @@ def scene(run: Run, motions: Motions) -> dict[str, Any]:
     """Return the scene; lengths in m, fleet-local ENU.
 
     ``airframe`` is the vehicles' shape (``Airframe``), ``dMin`` the least distance of the scenario, None if
-    it is unknown. ``fixed`` are posts and spheres, ``movers`` are in the order of the moving obstacles,
-    ``surfaces`` are lines as offsets from the target, and ``bystanders`` is the number of these vehicles.
+    it is unknown. ``fixed`` are spheres, posts and boxes (``Solid``), ``movers`` are in the order of the
+    moving obstacles, ``surfaces`` are lines as offsets from the target, and ``bystanders`` is the number of
+    these vehicles.
     """
     scenario, span = run.scenario, run.summary.get("span_m")
     frame = HEXAROTOR if scenario is None else airframe(scenario.vehicle)
@@ -30,7 +32,7 @@ def scene(run: Run, motions: Motions) -> dict[str, Any]:
     return {
         "airframe": frame._asdict(),
         "dMin": float(d_min) if isinstance(d_min, int | float) else None,
-        "fixed": [] if scenario is None else [dict(_fixed(one)) for one in scenario.obstacles],
+        "fixed": [] if scenario is None else [_fixed(one) for one in solids(scenario.obstacles)],
         "movers": []
         if scenario is None
         else [dict(_mover(scenario, j)) for j in range(len(scenario.moving))],
@@ -40,10 +42,12 @@ def scene(run: Run, motions: Motions) -> dict[str, Any]:
     }
 
 
-def _fixed(obstacle: Any) -> Iterator[tuple[str, object]]:
-    yield from (("kind", obstacle.kind), ("at", list(obstacle.at)), ("radius", obstacle.radius))
-    if obstacle.kind == "post":
-        yield "height", obstacle.height
+def _fixed(solid: Solid) -> dict[str, object]:
+    kind, at, radius, height, size, yaw = solid
+    shape: dict[str, object] = {"kind": kind, "at": at}
+    if kind == "box":
+        return {**shape, "size": size, "yaw": round(yaw, 6)}
+    return {**shape, "radius": radius, **({"height": height} if kind == "post" else {})}
 
 
 def _mover(scenario: Scenario, j: int) -> Iterator[tuple[str, object]]:

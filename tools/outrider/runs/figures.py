@@ -12,6 +12,7 @@ from outrider.palette import LIMIT, OBSTACLE, TARGET, coloured, hex_of
 from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
 from outrider.runs.summary import Value, standoff_errors, yaw_errors
+from outrider.scenarios.footprints import circles, rectangles
 from outrider.scenarios.scenario import TARGET_SYSTEM
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
 
     Moving obstacles are drawn with their paths.
     """
+    from matplotlib.collections import PolyCollection
     from matplotlib.patches import Circle
 
     few = len(flight.systems) <= _MAX_NAMED_VEHICLES
@@ -70,8 +72,9 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
         axes.plot(samples.position[:, k, 0], samples.position[:, k, 1], lw=1.0, color=of, label=name)
         axes.plot(*samples.position[0, k, :2], "o", ms=4, mfc="none", color=of)
         axes.plot(*samples.position[-1, k, :2], "o", ms=5, color=of)
-    for obstacle in flight.scenario.obstacles:
-        axes.add_patch(Circle(obstacle.at[:2], obstacle.radius, color=OBSTACLE, lw=0.0))
+    for east, north, radius in circles(flight.scenario.obstacles):
+        axes.add_patch(Circle((east, north), radius, color=OBSTACLE, lw=0.0))
+    axes.add_collection(PolyCollection(list(rectangles(flight.scenario.obstacles)), color=OBSTACLE, lw=0.0))
     for j, moving in enumerate(flight.scenario.moving):
         way = samples.moving[:, j, :2]
         axes.plot(way[:, 0], way[:, 1], color=OBSTACLE, lw=1.0)

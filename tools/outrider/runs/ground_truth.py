@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.obstacles.moving import MovingObstacles
-from companion.obstacles.static import FixedObstacles
+from outrider.runs.surfaces import Nearby, Rows, Surfaces
 
 Array = NDArray[np.float64]
 SAMPLE = 20_000
@@ -28,6 +28,8 @@ _BATCH_DISTANCES = 10_000
 """Approximate number of distances above which the collected samples are processed."""
 _CHUNK_DISTANCES = 5_000
 """Number of distances computed at a time: their differences fit the processor's cache."""
+_PIECE = 200
+"""Number of physics steps for which obstacles near the vehicles are searched together."""
 
 
 class Samples(NamedTuple):
@@ -74,18 +76,23 @@ class Encounters:
         self.count = 0
         self.minimum = float("inf")
 
-    def see(self, distances: Array) -> None:
-        """Process distances (n, pairs) at consecutive times; NaN where a pair is not in the air."""
+    def see(self, distances: Array, of: Rows | slice = slice(None)) -> None:
+        """Process distances (n, P) of the pairs ``of`` at consecutive times; NaN where one is not in the air.
+
+        All other pairs are further away than the least distance. A pair below it that is no longer in the air
+        must be among ``of``.
+        """
         least = _least(distances)
         self.minimum = min(self.minimum, least)
         if least < self._least or self._below.any():
-            below = np.vstack([self._below, distances < self._least])
+            below = np.vstack([self._below[of], distances < self._least])
             # A pair keeps its last state while its distance is unknown.
             unknown = np.isnan(distances)
             for step in np.flatnonzero(unknown.any(axis=1)):
                 below[step + 1] |= below[step] & unknown[step]
             self.count += int((below[1:] & ~below[:-1]).sum())
-            self._below = below[-1]
+            self._below[:] = False
+            self._below[of] = below[-1]
 
 
 class GroundTruth:
@@ -98,7 +105,7 @@ class GroundTruth:
         self,
         vehicles: int,
         limits: Limits,
-        obstacles: FixedObstacles | None = None,
+        obstacles: Surfaces | None = None,
         moving: MovingObstacles | None = None,
     ) -> None:
         self._count = vehicles
@@ -109,8 +116,10 @@ class GroundTruth:
         self._target = Encounters(vehicles, 0.0 if limits.target is None else limits.target)
         self._moving = moving if moving is not None and len(moving) else None
         self._moves = 0 if self._moving is None else len(self._moving)
-        stands = 0 if self._fixed is None else len(self._fixed)
-        self._obstacles = Encounters(vehicles * (stands + self._moves), limits.obstacles)
+        self._nearby = None if self._fixed is None else Nearby(self._fixed, vehicles)
+        self._stands = 0 if self._fixed is None else len(self._fixed)
+        self._obstacles = Encounters(vehicles * (self._stands + self._moves), limits.obstacles)
+        self._least_to_obstacles = limits.obstacles
         self._target_counts = limits.target is not None
         # Data without computed distances yet: the tracks before each sample, those of the target and of
         # moving obstacles.
@@ -164,14 +173,33 @@ class GroundTruth:
         if self._target_counts:
             off = track - np.concatenate(self._places)[:, None]
             self._target.see(np.sqrt(np.einsum("tki,tki->tk", off, off)))
-        surfaces = [] if self._fixed is None else [self._fixed.distance(track)]
-        if self._moving is not None:
-            surfaces.append(self._moving.distance(track, np.concatenate(self._moved)))
-        if surfaces:
-            self._obstacles.see(np.concatenate(surfaces, axis=2).reshape(len(track), -1))
+        if self._stands or self._moves:
+            moved = np.concatenate(self._moved)
+            for first in range(0, len(track), _PIECE):
+                self._see_obstacles(track[first : first + _PIECE], moved[first : first + _PIECE])
         self._tracks.clear()
         self._places.clear()
         self._moved.clear()
+
+    def _see_obstacles(self, track: Array, moved: Array) -> None:
+        """Count encounters on ``track`` (n, K, 3) with fixed obstacles and with those at ``moved`` (n, M, 3).
+
+        Fixed obstacles further than the least distance so far, and than the limit, change nothing.
+        """
+        surfaces, pairs = [np.empty((len(track), 0))], [np.empty(0, dtype=np.int64)]
+        if self._fixed is not None and self._nearby is not None:
+            least = self._obstacles.minimum
+            if np.isinf(least):
+                least = _least(self._fixed.nearest(track))
+            if np.isfinite(least):
+                near = self._nearby.pairs(track, max(least, self._least_to_obstacles))
+                surfaces.append(self._fixed.distance(track[:, near.vehicle], near.obstacle))
+                pairs.append(near.vehicle * self._stands + near.obstacle)
+        if self._moving is not None:
+            surfaces.append(self._moving.distance(track, moved).reshape(len(track), -1))
+            first = self._count * self._stands
+            pairs.append(np.arange(first, first + self._count * self._moves))
+        self._obstacles.see(np.concatenate(surfaces, axis=1), np.concatenate(pairs))
 
     def latest(self) -> tuple[Array, Array, Array | None]:
         """Return positions and velocities (K, 3) of the last sample, and the target's position or None."""

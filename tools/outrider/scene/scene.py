@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import radians
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.config.companion import Obstacle
+from companion.config.obstacles import Box, Obstacle, Post, Sphere
+from outrider.scenarios.footprints import without_walls
 from outrider.scenarios.moving import MovingPostPart
 from outrider.scenarios.scenario import FixedTarget, Scenario
 from outrider.scenarios.starts import starts
@@ -20,12 +23,17 @@ LEAST_REACH = 4.0
 
 
 class Solid(NamedTuple):
-    """A ball around ``at``, or a post that stands on the ground at ``at``; m."""
+    """A ball or a box around ``at``, or a post that stands on the ground at ``at``; m.
 
-    kind: Literal["sphere", "post"]
+    ``size``: lengths of a box along its own axes, which are turned by ``yaw`` (rad) from east to north.
+    """
+
+    kind: Literal["sphere", "post", "box"]
     at: tuple[float, float, float]
-    radius: float
+    radius: float = 0.0
     height: float = 0.0
+    size: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw: float = 0.0
 
 
 class Scene(NamedTuple):
@@ -83,7 +91,7 @@ def staged(scenario: Scenario, seed: int, airframe: Airframe, levers: frozenset[
         companion.field.d_safe,
         scenario.d_min_target,
         scenario.d_min_obstacle,
-        tuple(_solid(one) for one in scenario.obstacles),
+        solids(scenario.obstacles),
         tuple(
             Solid("post", (0.0, 0.0, 0.0), one.radius, one.height)
             if isinstance(one, MovingPostPart)
@@ -102,9 +110,16 @@ def staged(scenario: Scenario, seed: int, airframe: Airframe, levers: frozenset[
     )
 
 
-def _solid(obstacle: Obstacle) -> Solid:
-    if obstacle.kind == "post":
-        return Solid("post", (obstacle.at[0], obstacle.at[1], 0.0), obstacle.radius, obstacle.height)
+def solids(obstacles: Sequence[Obstacle]) -> tuple[Solid, ...]:
+    """Return the shapes and places of fixed obstacles, in their order."""
+    return tuple(map(_solid, without_walls(obstacles)))
+
+
+def _solid(obstacle: Sphere | Post | Box) -> Solid:
+    if isinstance(obstacle, Box):
+        return Solid("box", obstacle.at, size=obstacle.size, yaw=radians(obstacle.yaw_deg))
+    if isinstance(obstacle, Post):
+        return Solid("post", (*obstacle.at, 0.0), obstacle.radius, obstacle.height)
     return Solid("sphere", obstacle.at, obstacle.radius)
 
 

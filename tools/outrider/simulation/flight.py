@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from companion.obstacles.moving import MovingObstacles
-from companion.obstacles.static import FixedObstacles
 from mavlink_bridge.loops.lockstep import StepObserver
 from outrider.runs.ground_truth import GroundTruth, Limits
 from outrider.runs.outcome import Messages, Outcome
+from outrider.runs.surfaces import Surfaces
 from outrider.scenarios.feasibility import check_drawn
 from outrider.scenarios.scenario import Scenario
 from outrider.scene.changes import Change
@@ -183,6 +183,6 @@ def truth_of(scenario: Scenario) -> GroundTruth:
             scenario.d_min_obstacle,
             scenario.companion.field.downwash,
         ),
-        FixedObstacles(scenario.obstacles),
+        Surfaces(scenario.obstacles),
         MovingObstacles(scenario.moving_known),
     )

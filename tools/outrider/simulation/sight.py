@@ -5,20 +5,23 @@ No companion is on the link ``sight``. It has no faults, and its messages do not
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from math import radians
 
+import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config.companion import Moving, Obstacle
-from companion.config.obstacles import MovingSphere, Sphere
-from mavlink_bridge.frames import FleetFrame, ned_to_enu
+from companion.config.obstacles import MovingSphere, Post, Sphere
+from mavlink_bridge.frames import FleetFrame, enu_to_ned, ned_to_enu, yaw_to_ned
 from mavlink_bridge.messages import Source
 from mavlink_bridge.network.simulated import Channel, Faults
 from mavlink_bridge.node import Datagram, Node
 from mavlink_bridge.wire.codec import Codec
+from outrider.scenarios.footprints import without_walls
 from outrider.scene.camera_view import NO_VIEW, Single, view_row
 from outrider.simulation.paths import Array
-from sitl.camera.occlusion import Ball, Body, Column, Ground, Point
+from sitl.camera.occlusion import Ball, Blocks, Body, Column, Ground, Point
 from sitl.camera.scene import LINK, Scene, truth
 from sitl.node import Autopilot
 from sitl.vehicle.config import VehicleConfig
@@ -79,7 +82,7 @@ def scene(
             bodies[one.system] = Ball(_HERE, one.radius)
         else:
             bodies[one.system] = _column((0.0, 0.0), one.radius, one.height)
-    return Scene(target, (Ground(_GROUND_M), *map(_fixed, obstacles)), bodies)
+    return Scene(target, (Ground(_GROUND_M), *_fixed(obstacles)), bodies)
 
 
 def view_of(autopilot: Autopilot) -> Single:
@@ -92,12 +95,23 @@ def view_of(autopilot: Autopilot) -> Single:
     return view_row(ned_to_enu(view.place), view.attitude, camera.config.pinhole.fields, found)
 
 
-def _fixed(obstacle: Obstacle) -> Body:
-    if isinstance(obstacle, Sphere):
-        east, north, up = obstacle.at
-        centre: Point = (north, east, -up)
-        return Ball(centre, obstacle.radius)
-    return _column(obstacle.at, obstacle.radius, obstacle.height)
+def _fixed(obstacles: Sequence[Obstacle]) -> Iterator[Body]:
+    """Yield the obstacles as bodies, all boxes and walls as one."""
+    boxes = []
+    for one in without_walls(obstacles):
+        if isinstance(one, Sphere):
+            east, north, up = one.at
+            centre: Point = (north, east, -up)
+            yield Ball(centre, one.radius)
+        elif isinstance(one, Post):
+            yield _column(one.at, one.radius, one.height)
+        else:
+            boxes.append(one)
+    if boxes:
+        centres = enu_to_ned([box.at for box in boxes])
+        headings = [yaw_to_ned(radians(box.yaw_deg)) for box in boxes]
+        turns = np.stack([np.cos(headings), np.sin(headings)], axis=1)
+        yield Blocks(centres, 0.5 * np.array([box.size for box in boxes]), turns)
 
 
 def _column(at: tuple[float, float], radius: float, height: float) -> Column:

@@ -29,6 +29,8 @@ _VIEW_SHARE = 0.18
 _TARGET = rgb(TARGET)
 _SCALE_LABELS = 2
 """Number of labelled distances in each direction from the middle of the ground."""
+_MAX_ROUND_SHELLS = 300
+"""Number of boxes up to which the edges of their shells are round; otherwise they are bevelled."""
 _NO_LINE = np.zeros((1, 2, 3))
 
 
@@ -254,9 +256,30 @@ class Renderer:
                 position=goal,
                 cast_shadow=False,
             )
+        boxes = [solid for solid in scene.solids if solid.kind == "box"]
+        if boxes:
+            self._boxes(boxes)
         for j, solid in enumerate(scene.solids):
-            handle = self._solid(f"solid-{j}", solid)
-            handle.position = solid.at
+            if solid.kind != "box":
+                handle = self._solid(f"solid-{j}", solid)
+                handle.position = solid.at
+
+    def _boxes(self, boxes: list[Solid]) -> None:
+        """Add all boxes as one mesh, and their shells as another: a browser draws thousands of them so."""
+        steps = 3 if len(boxes) <= _MAX_ROUND_SHELLS else 1
+        distance = self.scene.d_min_solid
+        for name, opacity, meshes in (
+            ("itself", None, [shapes.box(one.size) for one in boxes]),
+            ("shell", 0.15, [shapes.around_box(one.size, distance, steps) for one in boxes]),
+        ):
+            there = [shapes.placed(mesh, one.at, one.yaw) for mesh, one in zip(meshes, boxes, strict=True)]
+            self._stage.add_mesh_simple(
+                f"{WORLD}/boxes-{name}",
+                *shapes.joined(*there),
+                color=SOLID,
+                opacity=opacity,
+                cast_shadow=False,
+            )
 
     def _solid(self, name: str, solid: Solid) -> viser.FrameHandle:
         """Add a frame with the obstacle's shape, and the shell that no vehicle's centre may enter."""

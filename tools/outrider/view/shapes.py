@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -137,6 +137,49 @@ def ball(radius: float) -> Mesh:
             a, b = row * columns + column, row * columns + following
             faces += [(a, a + columns, b + columns), (a, b + columns, b)]
     return Mesh(vertices, np.array(faces))
+
+
+def box(size: tuple[float, float, float]) -> Mesh:
+    """Return a box whose faces share no vertices, so that their light is even, with lengths ``size`` (m)."""
+    quads = np.array(((0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)))
+    corners = np.array([(x, y, z) for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * size
+    faces = np.add.outer(4 * np.arange(len(quads)), ((0, 1, 2), (0, 2, 3))).reshape(-1, 3)
+    return Mesh(corners[quads.ravel()], faces)
+
+
+def around_box(size: tuple[float, float, float], distance: float, steps: int) -> Mesh:
+    """Return the surface at ``distance`` (m) from a box with lengths ``size`` (m); its edges are round.
+
+    It is a sphere whose eight parts are moved apart; ``steps``: number of facets of a quarter of a circle.
+    """
+    rows, columns = 2 * (steps + 1), 4 * (steps + 1)
+    # Each edge between two parts appears twice, once at either side of the gap.
+    quarter = 0.5 * pi * np.arange(steps + 1) / steps
+    polar = np.concatenate([quarter, 0.5 * pi + quarter])
+    turn = np.concatenate([0.5 * pi * k + quarter for k in range(4)])
+    side = np.repeat([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)], steps + 1, axis=0)
+    vertices = np.empty((rows, columns, 3))
+    vertices[..., 0] = distance * np.outer(np.sin(polar), np.cos(turn)) + 0.5 * size[0] * side[:, 0]
+    vertices[..., 1] = distance * np.outer(np.sin(polar), np.sin(turn)) + 0.5 * size[1] * side[:, 1]
+    vertices[..., 2] = distance * np.cos(polar)[:, None]
+    vertices[: steps + 1, :, 2] += 0.5 * size[2]
+    vertices[steps + 1 :, :, 2] -= 0.5 * size[2]
+    here, following = np.arange(columns), (np.arange(columns) + 1) % columns
+    top = np.arange(rows - 1)[:, None] * columns
+    a, b = (top + here).ravel(), (top + following).ravel()
+    sides = [np.stack([a, a + columns, b + columns], axis=1), np.stack([a, b + columns, b], axis=1)]
+    # The flat faces above and below: their corners are the poles of the parts.
+    corners = (steps + 1) * np.arange(4)
+    below = (rows - 1) * columns + corners
+    flat = [corners[[0, 1, 2]], corners[[0, 2, 3]], below[[0, 2, 1]], below[[0, 3, 2]]]
+    return Mesh(vertices.reshape(-1, 3), np.vstack([*sides, *flat]))
+
+
+def placed(mesh: Mesh, at: tuple[float, float, float], yaw: float) -> Mesh:
+    """Return a mesh turned by ``yaw`` (rad) about z, then moved to ``at`` (m)."""
+    x, y, z = mesh.vertices.T
+    turned = np.stack([cos(yaw) * x - sin(yaw) * y, sin(yaw) * x + cos(yaw) * y, z], axis=1)
+    return mesh._replace(vertices=turned + at)
 
 
 def tile() -> Mesh:

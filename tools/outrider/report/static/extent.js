@@ -31,7 +31,12 @@ function extent(from, to) {
       if (at) hold(at, mover.radius);
     });
   });
-  for (const one of run.scene.fixed) hold([one.at[0], one.at[1], one.kind === "sphere" ? one.at[2] : 0], one.radius);
+  for (const one of run.scene.fixed) {
+    if (one.kind === "box") {
+      const { corners, low: lowest } = prismOf(one);
+      for (const corner of corners) hold([...corner, Math.max(lowest, 0)]);
+    } else hold([one.at[0], one.at[1], one.kind === "sphere" ? one.at[2] : 0], one.radius);
+  }
   for (const goal of run.scene.goals) hold(goal);
   if (!points.length) hold([0, 0, 0], 5);
   // Sixteen lines or fewer to a side.

@@ -8,6 +8,7 @@ function mix() {
   const names = ["paper", "ink", "soft", "line", "grid", "bad", "accent", "solid", "bystander", "target", "label-target", "shadow"];
   for (let k = 0; k < COLOURS; k++) names.push(`vehicle-${k}`, `label-${k}`);
   ink = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  ink.shades = Array.from({ length: SHADES }, (_, k) => blend(ink.solid, ink.shadow, (0.5 * k) / (SHADES - 1)));
 }
 
 // Joined places; it breaks where one is missing or behind the eye.

@@ -1,4 +1,4 @@
-// What is seen at a time: a list of things with their depths, drawn from far to near.
+// What is seen at a time: a list of things with their places and depths, drawn from far to near among the boxes.
 
 const show = { trail: 5, spheres: true, references: true, ids: true, cameras: true };
 
@@ -8,11 +8,11 @@ function scene(g, time) {
   const places = all.map((point, k) => (cursor.hidden.has(k) ? null : point));
   const target = vector(flight.target, 0, here);
   const things = [];
-  const add = (point, draw, nearer = 0) => point && things.push({ depth: depth(point) - nearer, draw });
+  const add = (point, draw, nearer = 0) => point && things.push({ point, depth: depth(point) - nearer, draw });
   ground(g);
   fixed(g, add);
   movers(g, add, here);
-  goals(g);
+  goals(g, add);
   surfaces(g, target);
   if (target) add(target, () => star(g, target));
   trails(g, add, time);
@@ -20,8 +20,7 @@ function scene(g, time) {
   if (pair) nearest(g, add, places, pair);
   places.forEach((point, k) => point && vehicle(g, add, point, k, here, time));
   if (run.cameras && show.cameras) places.forEach((point, k) => point && sight(g, add, point, k, here));
-  things.sort((a, b) => b.depth - a.depth);
-  for (const { draw } of things) draw();
+  inOrder(g, things);
   if (show.ids) places.forEach((point, k) => point && label(g, point, String(flight.systems[k]), labelColourOf(k)));
   if (show.ids && target) label(g, target, "target", ink["label-target"]);
   return pair;
@@ -74,7 +73,7 @@ function number(g, at, out, text) {
 }
 
 function fixed(g, add) {
-  for (const one of run.scene.fixed) solid(g, add, one, one.at);
+  for (const one of run.scene.fixed) if (one.kind !== "box") solid(g, add, one, one.at);
 }
 
 function movers(g, add, here) {
@@ -87,7 +86,7 @@ function movers(g, add, here) {
   });
 }
 
-// A post that reaches beyond the flight is drawn as high as that.
+// A post or a box that reaches beyond the flight is drawn as high as that.
 function postTop(one) {
   return Math.min(one.height, bounds.high[2] + 1);
 }
@@ -111,14 +110,17 @@ function shadow(g, at, radius) {
   g.globalAlpha = 1;
 }
 
-function goals(g) {
+function goals(g, add) {
   run.scene.goals.forEach((goal, k) => {
-    if (cursor.hidden.has(k)) return;
-    polyline(g, level(goal, 0.3), true);
-    g.strokeStyle = colourOf(k);
-    g.lineWidth = 1.6;
-    g.stroke();
+    if (!cursor.hidden.has(k)) add(goal, () => mark(g, goal, colourOf(k)));
   });
+}
+
+function mark(g, goal, colour) {
+  polyline(g, level(goal, 0.3), true);
+  g.strokeStyle = colour;
+  g.lineWidth = 1.6;
+  g.stroke();
 }
 
 function surfaces(g, target) {

@@ -35,11 +35,15 @@ function piece(g, points, k, alpha) {
   g.globalAlpha = 1;
 }
 
+// What is on the ground is drawn before all that is not hidden behind the same boxes.
+const BELOW = -1e9;
+
 function vehicle(g, add, at, k, here, time) {
   const colour = colourOf(k);
   const { airframe, dMin } = run.scene;
-  shadow(g, at, 0.5 * airframe.span);
-  stem(g, at, colour);
+  const foot = [at[0], at[1], 0];
+  add(foot, () => shadow(g, at, 0.5 * airframe.span), BELOW);
+  add(foot, () => stem(g, at, colour), BELOW);
   if (show.spheres && dMin) add(at, () => ball(g, at, 0.5 * dMin, colour, colour, 0.1), -0.01);
   const reference = show.references && vector(flight.reference, k, here);
   if (reference) add(reference, () => followed(g, at, reference, colour));
