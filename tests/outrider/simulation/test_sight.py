@@ -12,10 +12,13 @@ from pydantic import ValidationError
 from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo
 from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
+from outrider.runs.surfaces import Surfaces
 from outrider.scenarios.scenario import Scenario
 from outrider.scene.changes import Change
+from outrider.simulation import sight
 from outrider.simulation.fleet import Fleet
 from outrider.simulation.flight import EPOCH, Flight
+from sitl.camera.occlusion import hidden
 from tests.outrider.shipped import FIREFLY, LOGS, scenario
 
 SHIFT = np.array((0.6, 0.0, 0.0))
@@ -142,3 +145,29 @@ def test_a_vehicles_file_may_have_the_camera() -> None:
 def test_wrong_cameras_are_refused(cameras: list[dict[str, Any]], said: str) -> None:
     with pytest.raises(ValidationError, match=said):
         scenario("walk", **SIGHT, cameras=cameras)
+
+
+BODIES: list[dict[str, Any]] = [
+    {"kind": "box", "at": [4.0, 1.0, 2.0], "size": [3.0, 0.6, 2.0], "yaw_deg": 25.0},
+    {"kind": "wall", "ends": [[-6.0, -2.0], [-1.0, 4.0]], "thickness": 0.3, "height": 4.0},
+    {"kind": "post", "at": [-3.0, -5.0], "radius": 0.7, "height": 3.0},
+    {"kind": "sphere", "at": [1.0, -4.0, 3.0], "radius": 1.2},
+]
+
+
+def test_obstacles_hide_where_they_are() -> None:
+    """In the fleet's frame and in the cameras': a line is crossed where a point of it is inside."""
+    of = scenario("walk", obstacles=BODIES)
+    surfaces = Surfaces(of.obstacles)
+    shown = sight.scene(10, of.obstacles, (), (), FIREFLY)
+    random = np.random.default_rng(5)
+    crossed = 0
+    for eye, point in random.uniform((-8.0, -8.0, 0.2), (8.0, 8.0, 6.0), (120, 2, 3)):
+        line = np.linspace(eye, point, 1201)
+        nearest = float(surfaces.nearest(line[:, None]).min())
+        if abs(nearest) < 0.02:
+            continue
+        ends = [(north, east, -up) for east, north, up in (eye.tolist(), point.tolist())]
+        assert hidden(ends[0], ends[1:], shown.fixed) == (nearest < 0.0)
+        crossed += nearest < 0.0
+    assert crossed > 20

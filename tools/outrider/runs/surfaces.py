@@ -33,7 +33,8 @@ class Pairs(NamedTuple):
 class Surfaces:
     """Surfaces of M fixed obstacles, fleet-local ENU, m.
 
-    Boxes and walls are solid with upright sides; a post has no lower end.
+    Boxes and walls are solid with upright sides; a post has no lower end. Distances to boxes are not computed
+    by the companion's functions, so that a fault of these shows.
     """
 
     def __init__(self, obstacles: Sequence[Obstacle]) -> None:
@@ -65,9 +66,9 @@ class Surfaces:
         return found
 
     def near(self, low: Array, high: Array, within: float) -> Rows:
-        """Return the obstacles that may be within ``within`` (m) of a point between ``low`` and ``high`` (3,).
+        """Return the obstacles that may be nearer than ``within`` (m) to a point between two corners (3,).
 
-        They are those whose bounds along the axes are.
+        They are those whose bounds along the axes are nearer to those of the corners.
         """
         gap = np.maximum(np.maximum(low - self._high, self._low - high), 0.0)
         return np.flatnonzero(np.sqrt(np.vecdot(gap, gap)) < within + _ROUNDING)
