@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from outrider.errors import OutriderError
+from outrider.scenarios.footprints import circles, rectangles
 from outrider.scenarios.scenario import Scenario
 from outrider.sweep.cells import scenario_of
 from outrider.sweep.tasks import Task
@@ -38,7 +39,8 @@ def _summary(of: Scenario, *, stuck: bool, near: bool) -> dict[str, Any]:
             "position": [start, end],
             "separation": [-1.0, 1.5],
             "target": [[0.0, 8.0]],
-            "obstacles": [[*one.at[:2], one.radius] for one in of.obstacles],
+            "obstacles": [list(one) for one in circles(of.obstacles)],
+            "boxes": rectangles(of.obstacles).tolist(),
             "moving": [[[0.0, 0.0], [1.0, 1.0]] for _ in of.moving],
             "moving_radius": [one.radius for one in of.moving],
             "vehicles": of.vehicles,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from outrider.errors import InputError
@@ -190,3 +191,14 @@ def test_without_an_escort_there_is_no_stand_off_and_without_a_flight_no_axes(
     rows = np.array(figure.axes).reshape(2, 2)
     assert [axes.axison for axes in rows[:, 1]] == [False, False]
     assert [text.get_text() for text in rows[0, 1].texts] == ["no flight"]
+
+
+def test_boxes_are_drawn_where_they_stand_and_the_panel_holds_them(drawn: Callable[..., Figure]) -> None:
+    corners = [[-20.0, 0.0], [-18.0, 2.0], [-19.0, 3.0], [-21.0, 1.0]]
+    of = scene(0.0, apart=3.0, standoff=False) | {"boxes": [corners]}
+    axes = drawn(of, scene(0.0, apart=3.0, standoff=False)).axes[0]
+    (boxes,) = (one for one in axes.collections if isinstance(one, PolyCollection))
+    (path,) = boxes.get_paths()
+    np.testing.assert_array_equal(path.vertices[:4], corners)
+    low, high = axes.get_xlim()
+    assert low < -21.0 < high

@@ -19,6 +19,7 @@ from outrider.report.command import make
 from outrider.report.reading import read
 from outrider.report.replay import Packed, pack, unpack
 from tests.outrider.report.runs import leave
+from tests.outrider.shipped import scenario
 
 NUMBERS = st.floats(-1e6, 1e6) | st.just(float("nan"))
 
@@ -154,3 +155,18 @@ def test_a_damaged_file_is_read_or_refused(place: int, byte: int, sound: tuple[P
     path.write_bytes(data)
     with contextlib.suppress(InputError):
         assert len(files.motions(path).time)
+
+
+def test_boxes_and_walls_are_in_the_page_where_they_stand(tmp_path: Path) -> None:
+    obstacles = [
+        {"kind": "box", "at": [4.0, -1.0, 2.0], "size": [2.0, 1.0, 3.0], "yaw_deg": 90.0},
+        {"kind": "wall", "ends": [[-3.0, 0.0], [1.0, 0.0]], "thickness": 0.5, "height": 4.0},
+        {"kind": "post", "at": [0.0, 8.0], "radius": 0.5, "height": 6.0},
+    ]
+    of = scenario("antipodal-8", vehicles=3, obstacles=obstacles)
+    page = make(leave(tmp_path / "run", scenario=of).directory).text
+    assert embedded(page)["scene"]["fixed"] == [  # type: ignore[index]
+        {"kind": "box", "at": [4.0, -1.0, 2.0], "size": [2.0, 1.0, 3.0], "yaw": 1.570796},
+        {"kind": "box", "at": [-1.0, 0.0, 2.0], "size": [4.0, 0.5, 4.0], "yaw": 0.0},
+        {"kind": "post", "at": [0.0, 8.0, 0.0], "radius": 0.5, "height": 6.0},
+    ]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from outrider.runs.figures import draw
 from outrider.runs.ground_truth import Samples
@@ -26,12 +29,12 @@ def circling(vehicles: int, count: int = 60) -> Samples:
     return Samples(time, place, place, place, place, place, flat, flat, target, apart, still)
 
 
-def flown(vehicles: int) -> Outcome:
+def flown(vehicles: int, **changes: Any) -> Outcome:
     """All that a picture asks of a flight."""
     samples = circling(vehicles)
     flight: Any = SimpleNamespace(
         truth=SimpleNamespace(samples=lambda: samples),
-        scenario=scenario("antipodal", vehicles=max(vehicles, 2)),
+        scenario=scenario("antipodal", vehicles=max(vehicles, 2), **changes),
         systems=tuple(range(11, 11 + vehicles)),
         target_system=10,
         starts=SimpleNamespace(goals=None),
@@ -55,26 +58,48 @@ def covering(figure: Figure) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("vehicles", [1, 8, 24, 25, pytest.param(200, marks=pytest.mark.slow)])
-def test_every_path_is_drawn_and_few_are_named(
-    vehicles: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    drawn: list[Figure] = []
+@pytest.fixture
+def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Outcome], Figure]:
+    """Draws a flight, and gives the figure."""
+    found: list[Figure] = []
     save = Figure.savefig
 
     def kept(figure: Figure, *arguments: Any, **more: Any) -> None:
-        drawn.append(figure)
+        found.append(figure)
         save(figure, *arguments, **more)
 
+    def call(flight: Outcome) -> Figure:
+        said = {"avoidance": "field", "method": "tangential", "converged": None}
+        said |= {"min_separation_m": 4.0, "d_min_violations": 0}
+        draw(flight, said, tmp_path / "flight.png")
+        return found[-1]
+
     monkeypatch.setattr(Figure, "savefig", kept)
-    said = {"avoidance": "field", "method": "tangential", "converged": None}
-    said |= {"min_separation_m": 4.0, "d_min_violations": 0}
-    draw(flown(vehicles), said, tmp_path / "flight.png")
-    paths = drawn[0].axes[0]
+    return call
+
+
+def test_boxes_and_walls_are_drawn_where_they_stand(drawn: Callable[[Outcome], Figure]) -> None:
+    box = {"kind": "box", "at": [4.0, 1.0, 2.0], "size": [2.0, 1.0, 4.0], "yaw_deg": 90.0}
+    wall = {"kind": "wall", "ends": [[-3.0, -4.0], [0.0, 0.0]], "thickness": 0.5}
+    post = {"kind": "post", "at": [0.0, 8.0], "radius": 0.5}
+    axes = drawn(flown(3, obstacles=[box, post, wall])).axes[0]
+    (boxes,) = (one for one in axes.collections if isinstance(one, PolyCollection))
+    corners = [[4.5, 0.0], [4.5, 2.0], [3.5, 2.0], [3.5, 0.0]]
+    ends = [[-2.8, -4.15], [0.2, -0.15], [-0.2, 0.15], [-3.2, -3.85]]
+    for path, expected in zip(boxes.get_paths(), (corners, ends), strict=True):
+        np.testing.assert_allclose(path.vertices[:4], expected, atol=1e-9)
+    (circle,) = (one for one in axes.patches if isinstance(one, Circle))
+    assert (circle.center, circle.radius) == ((0.0, 8.0), 0.5)
+
+
+@pytest.mark.parametrize("vehicles", [1, 8, 24, 25, pytest.param(200, marks=pytest.mark.slow)])
+def test_every_path_is_drawn_and_few_are_named(vehicles: int, drawn: Callable[[Outcome], Figure]) -> None:
+    figure = drawn(flown(vehicles))
+    paths = figure.axes[0]
     ways = [line for line in paths.lines if len(line.get_xdata()) == 60 and line.get_marker() == "None"]
     assert len(ways) >= vehicles
     legend = paths.get_legend()
     assert legend is not None
     names = [text.get_text() for text in legend.get_texts()]
-    assert covering(drawn[0]) == []
+    assert covering(figure) == []
     assert names == [*([str(11 + k) for k in range(vehicles)] if vehicles <= 24 else []), "target"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import cos, inf, nan, sin
+from math import cos, inf, nan, pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from hypothesis import strategies as st
 
 from companion.values.horizon import roll_out
 from outrider.palette import VEHICLES, linear, rgb
+from outrider.runs.surfaces import Surfaces
+from outrider.scenarios.footprints import rectangles
 from outrider.scene.airframe import HEXAROTOR, airframe
 from outrider.scene.planes import MOST, between, facing
 from outrider.scene.scene import Scene, staged
@@ -105,6 +108,9 @@ def test_a_plan_of_any_length_fills_its_rows() -> None:
         shapes.ball(1.0),
         shapes.prism(8, 1.0, 2.0),
         shapes.cone(1.0, 0.2, 0.0),
+        shapes.box((1.0, 2.0, 3.0)),
+        shapes.around_box((1.0, 2.0, 3.0), 0.5, 3),
+        shapes.around_box((0.2, 5.0, 1.0), 0.3, 1),
     ],
 )
 def test_meshes_are_closed_and_look_outwards(mesh: shapes.Mesh) -> None:
@@ -172,3 +178,34 @@ def test_a_large_fleet_has_a_short_table() -> None:
     )
     text = table(Scene("many", tuple(range(1, count + 1)), count), moment)
     assert "and 136 more" in text
+
+
+BOX: dict[str, Any] = {"kind": "box", "at": [4.0, -1.0, 2.0], "size": [2.0, 1.0, 3.0], "yaw_deg": 35.0}
+WALL: dict[str, Any] = {"kind": "wall", "ends": [[-3.0, -4.0], [1.0, 3.0]], "thickness": 0.5, "height": 4.0}
+
+
+def test_boxes_and_walls_lie_in_the_picture_where_they_stand() -> None:
+    """The mesh is the surface, and the shell is the surface d_min away: all of it, and nothing else."""
+    of = scenario("obstacles", obstacles=[BOX, WALL])
+    scene = staged(of, 1, airframe(of.vehicle), frozenset())
+    surfaces, d_min = Surfaces(of.obstacles), scene.d_min_solid
+    for k, one in enumerate(scene.solids):
+        itself = shapes.placed(shapes.box(one.size), one.at, one.yaw)
+        shell = shapes.placed(shapes.around_box(one.size, d_min, 3), one.at, one.yaw)
+        for mesh, distance in ((itself, 0.0), (shell, d_min)):
+            apart = surfaces.distance(mesh.vertices[:, None], np.array([k]))
+            np.testing.assert_allclose(apart, distance, atol=1e-9)
+        corners = rectangles(of.obstacles)[k]
+        low, high = one.at[2] - 0.5 * one.size[2], one.at[2] + 0.5 * one.size[2]
+        expected = {(round(x, 6), round(y, 6), round(z, 6)) for x, y in corners for z in (low, high)}
+        assert {tuple(np.round(place, 6)) for place in itself.vertices} == expected
+
+
+def test_a_shell_of_a_box_holds_what_is_near_it() -> None:
+    """Its volume is that of the box, of its sides' slabs, its edges' quarters and its corners' eighths."""
+    size, d = (1.0, 2.0, 3.0), 0.5
+    (x, y, z), mesh = size, shapes.around_box(size, d, 24)
+    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    volume = np.einsum("fi,fi->f", a, np.cross(b, c)).sum() / 6.0
+    exact = x * y * z + 2 * d * (x * y + y * z + z * x) + pi * d**2 * (x + y + z) + 4 / 3 * pi * d**3
+    assert volume == pytest.approx(exact, rel=2e-3)
