@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
 from collections.abc import Callable
 from html import unescape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from outrider.palette import VEHICLES
 from outrider.report.command import report
+from outrider.runs.surfaces import Surfaces
 from tests.outrider.report.runs import WrittenRun, leave
+from tests.outrider.shipped import scenario
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None
@@ -49,12 +53,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> WrittenRun:
 @pytest.fixture
 def browse(tmp_path: Path) -> Browse:
     """Opens a page from disk, and gives its elements after its program ran. ``also`` is a program that runs
-    after that, for which the page's policy is taken off; ``silent``: nothing goes wrong."""
+    after that, and ``within`` one that runs at its end and has its names: the page's policy is then taken
+    off; ``silent``: nothing goes wrong."""
 
-    def call(page: Path, address: str = "", also: str = "", silent: bool = True) -> str:
+    def call(page: Path, address: str = "", also: str = "", within: str = "", silent: bool = True) -> str:
         assert CHROMIUM is not None
-        if also:
+        if also or within:
             text = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", page.read_text())
+            text = text.replace("\n})();", f"\n{within}\n}})();")
             page = tmp_path / "page.html"
             page.write_text(text.replace("</body>", f"<script>{also}</script></body>"))
         done = subprocess.run(
@@ -119,6 +125,66 @@ def test_the_canvas_is_painted(made: WrittenRun, browse: Browse) -> None:
     assert found is not None
     # The colours of the three vehicles, among others.
     assert {code[1:] for code in VEHICLES[:3]} <= set(found[1].split())
+
+
+OBSTACLES: list[dict[str, Any]] = [
+    {"kind": "wall", "ends": [[-7.0, -2.0], [1.0, -6.0]], "thickness": 0.3, "height": 4.0},
+    {"kind": "wall", "ends": [[2.0, 7.0], [7.0, 1.0]], "height": 5.0},
+    {"kind": "box", "at": [0.0, 0.0, 1.0], "size": [4.0, 2.0, 2.0], "yaw_deg": 30.0},
+    {"kind": "box", "at": [0.3, 0.0, 4.0], "size": [1.5, 2.5, 1.0], "yaw_deg": 70.0},
+    {"kind": "box", "at": [-5.0, 4.0, 2.0], "size": [2.0, 2.0, 4.0], "yaw_deg": 45.0},
+    {"kind": "box", "at": [5.0, -4.0, 3.0], "size": [3.0, 1.0, 1.0]},
+]
+
+
+def test_boxes_hide_what_is_behind_them_and_nothing_else(browse: Browse, tmp_path: Path) -> None:
+    """A point is painted among the boxes, seen from everywhere: its pixel shows whether it was hidden."""
+    of = scenario("antipodal-8", vehicles=3, obstacles=OBSTACLES)
+    directory = leave(tmp_path / "run", scenario=of).directory
+    report(directory)
+    within = """
+      let seed = 7;
+      const random = () => (seed = (seed * 16807) % 2147483647) / 2147483647;
+      const sheet = document.createElement("canvas");
+      [sheet.width, sheet.height] = [camera.width, camera.height];
+      const g = sheet.getContext("2d", { willReadFrequently: true });
+      const told = [];
+      for (let round = 0; round < 12; round++) {
+        camera.flat = round % 4 === 3;
+        [camera.azimuth, camera.elevation] = [6.3 * random(), 1.6 * random()];
+        camera.distance = 8 + 20 * random();
+        aim();
+        for (let k = 0; k < 30; k++) {
+          const point = [16 * random() - 8, 16 * random() - 8, 6 * random()];
+          const [x, y] = project(point) ?? [-1, -1];
+          if (x < 5 || y < 5 || x > camera.width - 5 || y > camera.height - 5) continue;
+          g.clearRect(0, 0, camera.width, camera.height);
+          const draw = () => {
+            g.fillStyle = "#ff0000";
+            g.fillRect(x - 3, y - 3, 6, 6);
+          };
+          inOrder(g, [{ point, depth: depth(point), draw }]);
+          const [red, green] = g.getImageData(Math.round(x), Math.round(y), 1, 1).data;
+          told.push([...viewpoint(), ...point, red > 200 && green < 50 ? 1 : 0]);
+        }
+      }
+      document.body.dataset.told = JSON.stringify(told);
+    """
+    page = browse(directory / "report.html", "#1", within=within)
+    found = re.search(r'data-told="([^"]*)"', page)
+    assert found is not None
+    surfaces = Surfaces(of.obstacles)
+    shown = {True: 0, False: 0}
+    for *places, seen in json.loads(found[1]):
+        eye, point = np.reshape(places, (2, 3))
+        away = float(np.linalg.norm(eye - point))
+        line = point + np.linspace(0.0, min(1.0, 50.0 / away), 3001)[:, None] * (eye - point)
+        nearest = float(surfaces.nearest(line[:, None]).min())
+        # A pixel is a few centimetres wide.
+        if abs(nearest) > 0.06:
+            assert bool(seen) == (nearest > 0.0), (eye, point, nearest)
+            shown[bool(seen)] += 1
+    assert min(shown.values()) > 30
 
 
 def test_clicks_and_keys(made: WrittenRun, browse: Browse) -> None:
