@@ -22,14 +22,16 @@ from outrider.realtime.view_page import Window
 from outrider.runs import names
 from outrider.scene.changes import Change
 from outrider.scene.companion_snapshot import MODES, CompanionSnapshot
+from outrider.scene.datagram_channel import DatagramChannel, pair
 from outrider.scene.recorded import Record
-from outrider.scene.scene import Scene
+from outrider.scene.scene import Scene, Solid
 from outrider.scene.snapshot import KNOTS, NO_PLAN, Snapshot, State
 from outrider.scene.view_commands import ViewCommands
 from outrider.simulation.flight import Flight
 from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
 from outrider.view.listener import Listener
+from outrider.view.live import Begin, LiveSource, packed
 from outrider.view.player import Player, load
 from tests.outrider.report.runs import WrittenRun, leave
 from tests.outrider.said import Run
@@ -286,3 +288,26 @@ def test_commands_through_the_window() -> None:
     assert window.place.tolist() == [1.0, 2.0, 3.0]
     window.command(Change(methods="baseline"))
     assert window.methods == ("baseline",)
+
+
+@pytest.mark.parametrize("count", [0, 20_000])
+def test_a_flight_among_any_number_of_boxes_is_seen(count: int) -> None:
+    """A datagram holds no thousands of boxes."""
+    ours, theirs = map(DatagramChannel, pair())
+    boxes = tuple(Solid("box", (float(k), 0.0, 1.0), size=(0.5, 0.5, 2.0), yaw=0.1) for k in range(count))
+    begun = Begin(Scene("many", (11,), 1, solids=boxes), ViewCommands(paused=True))
+    data, filed = packed(begun)
+    assert (filed is not None) == (count > 0)
+    assert len(data) < 100_000
+    assert ours.send(data)
+    source = LiveSource(theirs, load)
+    (scene,) = source.poll(0.0)
+    assert isinstance(scene, Scene)
+    assert scene.solids == boxes
+    assert source.begin == begun.commands
+    assert filed is None or not filed.exists()
+    # A file that somebody removed is a scene that is not seen, and no more than that.
+    ours.send(data)
+    assert len(source.poll(0.0)) == (count == 0)
+    ours.close()
+    theirs.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import NamedTuple
 
 from outrider.scene.datagram_channel import DatagramChannel
@@ -12,6 +13,9 @@ from outrider.scene.scene import Scene
 from outrider.scene.snapshot import Snapshot
 from outrider.scene.view_commands import ViewCommands, encoded
 from outrider.view.player import Player
+
+_MAX_BEGIN_BYTES = 100_000
+"""Largest size of the start of a flight that is sent over the channel: many systems have room for 200 kB."""
 
 
 class Ready(NamedTuple):
@@ -32,6 +36,36 @@ class Landed(NamedTuple):
     """End of the flight, which left a run in ``directory``."""
 
     directory: str
+
+
+class Filed(NamedTuple):
+    """Message that is too large for the channel, in a ``file`` that the reader removes."""
+
+    file: str
+
+
+def packed(begin: Begin) -> tuple[bytes, Path | None]:
+    """Return the message to send, and the file that it is in, if it is too large; or raise OSError."""
+    data = pickle.dumps(begin)
+    if len(data) <= _MAX_BEGIN_BYTES:
+        return data, None
+    with NamedTemporaryFile(prefix="outrider-scene-", delete=False) as file:
+        file.write(data)
+    return pickle.dumps(Filed(file.name)), Path(file.name)
+
+
+def unpacked(data: bytes) -> object:
+    """Return a received message; None if it was in a file that is not there any more."""
+    sent = pickle.loads(data)
+    if not isinstance(sent, Filed):
+        return sent
+    path = Path(sent.file)
+    try:
+        return pickle.loads(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    finally:
+        path.unlink(missing_ok=True)
 
 
 class LiveSource:
@@ -65,7 +99,7 @@ class LiveSource:
         for data in self._line.receive():
             # Sent by the process that started this one, over a socket without a name that only processes of
             # this flight have.
-            sent = pickle.loads(data)
+            sent = unpacked(data)
             if isinstance(sent, Begin):
                 self._begin = sent.commands
                 found.append(sent.scene)

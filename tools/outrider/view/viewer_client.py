@@ -16,7 +16,7 @@ from outrider.errors import InputError
 from outrider.scene.datagram_channel import DatagramChannel, pair
 from outrider.scene.scene import Scene
 from outrider.scene.view_commands import ViewCommands
-from outrider.view.live import Begin, Landed, Ready
+from outrider.view.live import Begin, Landed, Ready, packed
 
 _START_TIMEOUT_S = 60.0
 """Time (s) that the process has to start."""
@@ -31,6 +31,7 @@ class ViewerClient:
 
     def __init__(self, host: str = "127.0.0.1", port: int = 8080) -> None:
         import_module("viser")
+        self._filed: Path | None = None
         ours, theirs = pair()
         self.line = DatagramChannel(ours)
         command = [sys.executable, "-m", "outrider.view.process", str(theirs.fileno()), host, str(port)]
@@ -52,7 +53,12 @@ class ViewerClient:
 
     def begin(self, scene: Scene, commands: ViewCommands) -> None:
         """Report that a flight of ``scene`` begins."""
-        self.line.send(pickle.dumps(Begin(scene, commands)))
+        try:
+            data, self._filed = packed(Begin(scene, commands))
+        except OSError:
+            # No room for the file: the flight must not be affected.
+            return
+        self.line.send(data)
 
     def landed(self, directory: Path) -> None:
         """Report that the flight has ended; the view then shows the run in ``directory``."""
@@ -74,6 +80,8 @@ class ViewerClient:
             self.process.kill()
             self.process.wait()
         self.line.close()
+        if self._filed is not None:
+            self._filed.unlink(missing_ok=True)
 
     def _ready(self) -> Ready:
         until = time.monotonic() + _START_TIMEOUT_S
