@@ -3,7 +3,7 @@
 // From light to dark.
 const SHADES = 8;
 // Pixels: a smaller box has no lines along its edges.
-const LEAST = 24;
+const LEAST = 60;
 
 // A share of the second colour in the first one; both are #rrggbb.
 function blend(one, other, share) {
@@ -20,6 +20,7 @@ function block(g, { corners, real, low, high }, eye) {
   const [lower, upper] = [bottom, top].map((z) => corners.map(([x, y]) => [x, y, z]));
   const fine = large([...lower, ...upper]);
   if (fine === null) return;
+  const edges = [];
   for (let i = 0; i < count; i++) {
     const j = (i + 1) % count;
     const [a, b] = [corners[i], corners[j]];
@@ -27,17 +28,21 @@ function block(g, { corners, real, low, high }, eye) {
     if (!real[i] || out[0] * (eye[0] - a[0]) + out[1] * (eye[1] - a[1]) <= 0) continue;
     const share = 0.5 - (0.28 * out[0] + 0.21 * out[1]) / (Math.hypot(out[0], out[1]) || 1);
     face(g, [lower[i], lower[j], upper[j], upper[i]], ink.shades[Math.round(share * (SHADES - 1))], fine);
+    edges.push(lower[i], lower[j], null, upper[i], upper[j], null);
+    // Where the box was divided it has no edge.
+    if (real[(i + count - 1) % count]) edges.push(lower[i], upper[i], null);
+    if (real[j]) edges.push(lower[j], upper[j], null);
   }
-  if (level === null) return;
-  const flat = level === top ? upper : lower;
-  face(g, flat, ink.shades[level === top ? 0 : SHADES - 1], fine);
+  if (level !== null) {
+    const flat = level === top ? upper : lower;
+    face(g, flat, ink.shades[level === top ? 0 : SHADES - 1], fine);
+    for (let i = 0; i < count; i++) if (real[i]) edges.push(flat[i], flat[(i + 1) % count], null);
+  }
   if (!fine) return;
+  polyline(g, edges);
   g.strokeStyle = ink.soft;
-  for (let i = 0; i < count; i++) {
-    if (!real[i]) continue;
-    polyline(g, [flat[i], flat[(i + 1) % count]]);
-    g.stroke();
-  }
+  g.lineWidth = 0.7;
+  g.stroke();
 }
 
 // Whether what has these corners is large in the picture; null if none of it is in the picture.

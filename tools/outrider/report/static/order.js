@@ -3,7 +3,7 @@
 // nearer. A box that a line crosses is divided, too.
 
 // At most this many boxes of a part of the ground, evenly chosen, give the lines by which it may be divided.
-const TRIED = 8;
+const TRIED = 4;
 
 // A box as { corners: counter-clockwise on the ground, real: whether the side after a corner is one of the box's,
 // low, high }.
@@ -32,12 +32,13 @@ function sideLine({ corners }, i) {
 const TOUCH = 1e-6;
 
 // 1: all of it on the positive side, -1: on the negative one, 0: the line crosses it.
-function sideOf(line, prism) {
-  let [least, most] = [Infinity, -Infinity];
-  for (const corner of prism.corners) {
-    const off = beyond(line, corner);
-    least = Math.min(least, off);
-    most = Math.max(most, off);
+function sideOf(line, { corners }) {
+  let least = Infinity;
+  let most = -Infinity;
+  for (let i = 0; i < corners.length; i++) {
+    const off = line[0] * corners[i][0] + line[1] * corners[i][1] - line[2];
+    if (off < least) least = off;
+    if (off > most) most = off;
   }
   return least >= -TOUCH ? 1 : most <= TOUCH ? -1 : 0;
 }
