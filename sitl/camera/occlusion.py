@@ -79,16 +79,19 @@ class Column(NamedTuple):
         return self._replace(axis=(self.axis[0] + by[0], self.axis[1] + by[1]))
 
 
-class Blocks(NamedTuple):
-    """M boxes with upright sides, around ``centres`` (M, 3).
+class Blocks:
+    """M boxes with upright sides, around ``centres`` (M, 3), in the order of north.
 
     ``halves`` (M, 3): half of their lengths along their own axes, of which x and y are level; ``turns``
     (M, 2): cosine and sine of the heading of their x axes, from north to east.
     """
 
-    centres: Array
-    halves: Array
-    turns: Array
+    def __init__(self, centres: Array, halves: Array, turns: Array) -> None:
+        order = np.argsort(centres[:, 0], kind="stable")
+        self.centres, self.halves, self.turns = centres[order], halves[order], turns[order]
+        self._north = np.ascontiguousarray(self.centres[:, 0])
+        self._reach = np.hypot(self.halves[:, 0], self.halves[:, 1])
+        self._largest = self._reach.max(initial=0.0)
 
     def hides(self, eye: Point, point: Point) -> bool:
         """Return whether the line from ``eye`` to ``point`` crosses any of the boxes.
@@ -96,12 +99,14 @@ class Blocks(NamedTuple):
         A part of the line lies between each two opposite sides of a box, and in the box where the three parts
         overlap. A line along a side does not cross it.
         """
-        begin = self._own(np.subtract(eye, self.centres))
-        step = self._own(np.broadcast_to(np.subtract(point, eye), self.centres.shape))
+        near = self._beside(eye, point)
+        halves = self.halves[near]
+        begin = self._own(near, np.subtract(eye, self.centres[near]))
+        step = self._own(near, np.broadcast_to(np.subtract(point, eye), begin.shape))
         with np.errstate(divide="ignore", invalid="ignore"):
-            enters = (-np.copysign(self.halves, step) - begin) / step
-            leaves = (np.copysign(self.halves, step) - begin) / step
-        along, between = step == 0.0, np.abs(begin) < self.halves
+            enters = (-np.copysign(halves, step) - begin) / step
+            leaves = (np.copysign(halves, step) - begin) / step
+        along, between = step == 0.0, np.abs(begin) < halves
         enters = np.where(along, np.where(between, -np.inf, np.inf), enters)
         leaves = np.where(along, np.inf, leaves)
         first, last = enters.max(axis=1), leaves.min(axis=1)
@@ -109,11 +114,20 @@ class Blocks(NamedTuple):
 
     def moved(self, by: Point) -> Blocks:
         """Return the boxes with their centres moved."""
-        return self._replace(centres=self.centres + by)
+        return Blocks(self.centres + by, self.halves, self.turns)
 
-    def _own(self, offsets: Array) -> Array:
-        """Return ``offsets`` (M, 3) in the axes of the boxes."""
-        (north, east, down), (cosine, sine) = offsets.T, self.turns.T
+    def _beside(self, eye: Point, point: Point) -> NDArray[np.int64]:
+        """Return the rows (n,) of the boxes that the bounds of the line, seen from above, may touch."""
+        low, high = np.minimum(eye, point), np.maximum(eye, point)
+        ends = (low[0] - self._largest, high[0] + self._largest)
+        first, last = np.searchsorted(self._north, ends)
+        places, reach = self.centres[first:last, :2], self._reach[first:last, None]
+        near = (places + reach >= low[:2]) & (places - reach <= high[:2])
+        return np.flatnonzero(near.all(axis=1)) + int(first)
+
+    def _own(self, rows: NDArray[np.int64], offsets: Array) -> Array:
+        """Return ``offsets`` (n, 3) in the axes of the boxes in ``rows`` (n,)."""
+        (north, east, down), (cosine, sine) = offsets.T, self.turns[rows].T
         return np.stack([cosine * north + sine * east, cosine * east - sine * north, down], axis=1)
 
 

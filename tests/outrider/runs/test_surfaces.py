@@ -181,8 +181,7 @@ def test_the_nearest_of_an_end_may_be_far_from_the_middle() -> None:
     """One is near the middle of a straight path, the other beyond its end, and there a bit nearer."""
     beside = Sphere(kind="sphere", at=(5.0, 3.0, 1.0), radius=0.1)
     beyond = Sphere(kind="sphere", at=(15.7, 0.0, 1.0), radius=0.1)
-    path = np.zeros((11, 1, 3)) + (0.0, 0.0, 1.0)
-    path[:, 0, 0] = np.arange(11)
+    path = np.array([[[float(k), 0.0, 1.0]] for k in range(11)])
     found = Surfaces((beside, beyond)).nearest(path)
     assert found[5, 0] == pytest.approx(2.9)
     assert found[10, 0] == pytest.approx(5.6)
