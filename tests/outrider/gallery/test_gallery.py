@@ -194,11 +194,14 @@ def test_without_an_escort_there_is_no_stand_off_and_without_a_flight_no_axes(
 
 
 def test_boxes_are_drawn_where_they_stand_and_the_panel_holds_them(drawn: Callable[..., Figure]) -> None:
-    corners = [[-20.0, 0.0], [-18.0, 2.0], [-19.0, 3.0], [-21.0, 1.0]]
+    corners = [[-8.0, 0.0], [-6.0, 2.0], [-7.0, 3.0], [-9.0, 1.0]]
     of = scene(0.0, apart=3.0, standoff=False) | {"boxes": [corners]}
     axes = drawn(of, scene(0.0, apart=3.0, standoff=False)).axes[0]
     (boxes,) = (one for one in axes.collections if isinstance(one, PolyCollection))
     (path,) = boxes.get_paths()
     np.testing.assert_array_equal(path.vertices[:4], corners)
     low, high = axes.get_xlim()
-    assert low < -21.0 < high
+    assert low < -9.0 < high
+    far = [[9000.0, 0.0], [9001.0, 0.0], [9001.0, 1.0], [9000.0, 1.0]]
+    other = drawn(of | {"boxes": [corners, far]}, of).axes[0]
+    assert other.get_xlim() == (low, high)

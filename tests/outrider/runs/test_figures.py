@@ -92,6 +92,18 @@ def test_boxes_and_walls_are_drawn_where_they_stand(drawn: Callable[[Outcome], F
     assert (circle.center, circle.radius) == ((0.0, 8.0), 0.5)
 
 
+def test_a_world_that_is_larger_than_the_flight_does_not_make_it_small(
+    drawn: Callable[[Outcome], Figure],
+) -> None:
+    """The flight is 40 m wide: what is 20 m beside it is in the picture, and what is far away is not."""
+    near = {"kind": "box", "at": [35.0, 0.0, 2.0], "size": [2.0, 1.0, 4.0]}
+    far = {"kind": "box", "at": [900.0, 0.0, 2.0], "size": [2.0, 1.0, 4.0]}
+    _, right = drawn(flown(8, obstacles=[near])).axes[0].get_xlim()
+    _, with_far = drawn(flown(8, obstacles=[near, far])).axes[0].get_xlim()
+    assert right == with_far
+    assert right > 36.0
+
+
 @pytest.mark.parametrize("vehicles", [1, 8, 24, 25, pytest.param(200, marks=pytest.mark.slow)])
 def test_every_path_is_drawn_and_few_are_named(vehicles: int, drawn: Callable[[Outcome], Figure]) -> None:
     figure = drawn(flown(vehicles))

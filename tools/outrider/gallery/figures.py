@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from outrider.palette import LIMIT, OBSTACLE, TARGET, coloured, hex_of
+from outrider.scenarios.footprints import beside
 from outrider.sweep.runs import Ending, Run
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def _corners(scene: Mapping[str, Any]) -> NDArray[np.float64]:
     found += [np.array(at, dtype=np.float64) for at in scene["target"]]
     for east, north, radius in scene["obstacles"]:
         found += [np.array([east - radius, north - radius]), np.array([east + radius, north + radius])]
-    return np.vstack([np.array(found), _boxes(scene).reshape(-1, 2)])
+    return np.vstack([np.array(found), beside(_boxes(scene), paths)])
 
 
 def _boxes(scene: Mapping[str, Any]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from outrider.palette import LIMIT, OBSTACLE, TARGET, coloured, hex_of
 from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
 from outrider.runs.summary import Value, standoff_errors, yaw_errors
-from outrider.scenarios.footprints import circles, rectangles
+from outrider.scenarios.footprints import beside, circles, rectangles
 from outrider.scenarios.scenario import TARGET_SYSTEM
 
 if TYPE_CHECKING:
@@ -74,7 +74,10 @@ def _paths(axes: Axes, flight: Outcome, samples: Samples) -> None:
         axes.plot(*samples.position[-1, k, :2], "o", ms=5, color=of)
     for east, north, radius in circles(flight.scenario.obstacles):
         axes.add_patch(Circle((east, north), radius, color=OBSTACLE, lw=0.0))
-    axes.add_collection(PolyCollection(list(rectangles(flight.scenario.obstacles)), color=OBSTACLE, lw=0.0))
+    boxes = rectangles(flight.scenario.obstacles)
+    axes.add_collection(PolyCollection(list(boxes), color=OBSTACLE, lw=0.0), autolim=False)
+    if len(boxes):
+        axes.update_datalim(beside(boxes, samples.position[..., :2].reshape(-1, 2)))
     for j, moving in enumerate(flight.scenario.moving):
         way = samples.moving[:, j, :2]
         axes.plot(way[:, 0], way[:, 1], color=OBSTACLE, lw=1.0)

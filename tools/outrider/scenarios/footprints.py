@@ -12,6 +12,8 @@ from companion.config.obstacles import Box, Obstacle, Post, Sphere, Wall
 
 Array = NDArray[np.float64]
 
+_LEAST_AROUND = 5.0
+
 
 def without_walls(obstacles: Sequence[Obstacle]) -> list[Sphere | Post | Box]:
     """Return the obstacles in their order, each wall as a box."""
@@ -27,6 +29,21 @@ def rectangles(obstacles: Sequence[Obstacle]) -> Array:
     """Return the corners (M, 4, 2) of boxes and walls, in their order, each counter-clockwise."""
     boxes = [_corners(one) for one in without_walls(obstacles) if isinstance(one, Box)]
     return np.array(boxes).reshape(-1, 4, 2)
+
+
+def beside(corners: Array, flown: Array) -> Array:
+    """Return those of ``corners`` (…, 2) near the places ``flown`` (n, 2), m, (k, 2): a picture holds them.
+
+    They are at most half the extent of these places away, or 5 m: a world may be far larger than a flight.
+    """
+    places = flown[np.isfinite(flown).all(axis=1)]
+    if not len(places):
+        return corners.reshape(-1, 2)
+    low, high = places.min(axis=0), places.max(axis=0)
+    wide = max(_LEAST_AROUND, 0.5 * float((high - low).max()))
+    points = corners.reshape(-1, 2)
+    near: Array = points[((points >= low - wide) & (points <= high + wide)).all(axis=1)]
+    return near
 
 
 def _corners(box: Box) -> Array:

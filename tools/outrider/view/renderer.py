@@ -30,7 +30,7 @@ _TARGET = rgb(TARGET)
 _SCALE_LABELS = 2
 """Number of labelled distances in each direction from the middle of the ground."""
 _MAX_ROUND_SHELLS = 300
-"""Number of boxes up to which the edges of their shells are round; otherwise they are bevelled."""
+"""Number of boxes up to which their shells are drawn like others."""
 _NO_LINE = np.zeros((1, 2, 3))
 
 
@@ -266,11 +266,12 @@ class Renderer:
 
     def _boxes(self, boxes: list[Solid]) -> None:
         """Add all boxes as one mesh, and their shells as another: a browser draws thousands of them so."""
-        steps = 3 if len(boxes) <= _MAX_ROUND_SHELLS else 1
+        # Of many shells behind each other each is fainter, and its edges are bevelled.
+        steps, faint = (3, 0.15) if len(boxes) <= _MAX_ROUND_SHELLS else (1, 0.05)
         distance = self.scene.d_min_solid
         for name, opacity, meshes in (
             ("itself", None, [shapes.box(one.size) for one in boxes]),
-            ("shell", 0.15, [shapes.around_box(one.size, distance, steps) for one in boxes]),
+            ("shell", faint, [shapes.around_box(one.size, distance, steps) for one in boxes]),
         ):
             there = [shapes.placed(mesh, one.at, one.yaw) for mesh, one in zip(meshes, boxes, strict=True)]
             self._stage.add_mesh_simple(

@@ -1,4 +1,4 @@
-// The box that holds all paths, obstacles and goals, and the points that have to be in the picture.
+// The bounds of all paths, obstacles and goals, and the points that have to be in the picture.
 function extent(from, to) {
   const points = [];
   const low = [Infinity, Infinity, 0];
@@ -31,10 +31,14 @@ function extent(from, to) {
       if (at) hold(at, mover.radius);
     });
   });
+  // Of boxes those near the flight: a world of them may be far larger.
+  const wide = Math.max(LEAST_AROUND, 0.5 * Math.max(high[0] - low[0], high[1] - low[1]));
+  const [least, most] = [low.map((value) => value - wide), high.map((value) => value + wide)];
   for (const one of run.scene.fixed) {
     if (one.kind === "box") {
       const { corners, low: lowest } = prismOf(one);
-      for (const corner of corners) hold([...corner, Math.max(lowest, 0)]);
+      const near = corners.filter((corner) => corner.every((value, i) => value >= least[i] && value <= most[i]));
+      for (const corner of near) hold([...corner, Math.max(lowest, 0)]);
     } else hold([one.at[0], one.at[1], one.kind === "sphere" ? one.at[2] : 0], one.radius);
   }
   for (const goal of run.scene.goals) hold(goal);
@@ -47,5 +51,7 @@ function extent(from, to) {
 }
 
 const MOST_POINTS = 3000;
+// m beside the flight that are in the picture if boxes stand there.
+const LEAST_AROUND = 5;
 
 let bounds = null;
