@@ -54,8 +54,9 @@ class FixedObstacles:
     def around(self, prediction: Array, reach: float) -> Axes:
         """Return the obstacles near the predicted positions (N + 1, 3).
 
-        These are all round ones whose surface, seen from above, reaches the bounding rectangle of the
-        predicted positions, extended by ``reach`` (m); and all boxes within ``reach`` of a predicted place.
+        These are, as seen from above, all round ones whose surface reaches the bounding rectangle of the
+        predicted positions, extended by ``reach`` (m), and all boxes within ``reach`` of a predicted place.
+        Heights do not count, because a vehicle that lands must not land on what is far below.
         """
         low, high = prediction[:, :2].min(axis=0) - reach, prediction[:, :2].max(axis=0) + reach
         off = np.maximum(np.maximum(low - self._xy, self._xy - high), 0.0)

@@ -60,7 +60,8 @@ def beside(path: Array, boxes: Boxes) -> tuple[Array, Array]:
     A place is the nearest point of the surface. Once the path has entered a box, it lies 1 mm behind the
     path's own point, seen from the face through which it entered. So a path is pushed back out of a box, and
     not on where it has left it on the other side. A path that begins inside is pushed to the nearest face.
-    Also returned are the least distances (M,), m, of the points outside; 0 for a path that enters the box.
+    Also returned are the least distances (M,), m, of the path from the boxes as seen from above; 0 for a box
+    that it enters.
     """
     path = np.ascontiguousarray(path)
     places, least = np.empty((len(boxes.centres), *path.shape)), np.empty(len(boxes.centres))
@@ -199,8 +200,9 @@ def _beside(path: Array, centres: Array, halves: Array, turns: Array, places: Ar
                 before[i] = own[i]
             if face >= 0:
                 place[face // 2] -= _INSIDE_M if face % 2 == 0 else -_INSIDE_M
-                distance = 0.0
-            least[m] = min(least[m], distance)
+                least[m] = 0.0
+            x, y = max(abs(own[0]) - half[0], 0.0), max(abs(own[1]) - half[1], 0.0)
+            least[m] = min(least[m], sqrt(x * x + y * y))
             places[m, n, 0] = centres[m, 0] + turn[0] * place[0] - turn[1] * place[1]
             places[m, n, 1] = centres[m, 1] + turn[1] * place[0] + turn[0] * place[1]
             places[m, n, 2] = centres[m, 2] + place[2]

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from companion.config import CompanionConfig
+from companion.config.obstacles import Box
 from companion.goals.settling import Settling, beside_column, between_columns
 from companion.obstacles import proximity, static, traffic
+from companion.obstacles.static import FixedObstacles
 from companion.values.horizon import Motion
 from companion.values.obstacles import Obstacles
+from companion.world import World
+from mavlink_bridge.frames import FleetFrame
 
 HERE = Motion(np.array([0.0, 0.0, 5.0]), np.zeros(3), np.zeros(3))
 VEHICLE, TARGET, SIZE = 12, 1, 0.4
@@ -49,3 +53,23 @@ def test_who_moves_aside_does_so_from_what_is_in_the_way() -> None:
     assert not settling.clear
     assert place[1] > between_columns(CERTIFIED) - 4.0
     assert place[0] == 0.0
+
+
+@pytest.mark.parametrize("config", [CompanionConfig(), CERTIFIED], ids=["field", "certified"])
+def test_nobody_lands_on_a_box_however_far_below_it_is(config: CompanionConfig) -> None:
+    """Above a roof, or below a plate that hangs, a vehicle moves aside until it is clear of it."""
+    roof = Box(kind="box", at=(0.5, -1.0, 2.0), size=(6.0, 30.0, 4.0), yaw_deg=10.0)
+    plate = Box(kind="box", at=(0.5, -1.0, 100.0), size=(6.0, 30.0, 0.1), yaw_deg=10.0)
+    for box in (roof, plate):
+        config = config.model_copy(update={"obstacles": (box,)})
+        picture = World(config, 11, 1, FleetFrame(47.4, 8.5, 488.0))
+        settling, here = Settling(config), np.array([0.0, 0.0, 60.0])
+        for _ in range(30):
+            prediction = np.broadcast_to(here, (config.horizon.steps + 1, 3))
+            near_by = picture.obstacles(1, picture.at(1), prediction)
+            here = settling.rest(1, Motion(here, np.zeros(3), np.zeros(3)), near_by)
+            if settling.clear:
+                break
+        assert settling.clear
+        beside = here * (1.0, 1.0, 0.0) + (0.0, 0.0, box.at[2])
+        assert FixedObstacles([box]).distance(beside)[0] >= config.guard.landing_clearance

@@ -119,8 +119,8 @@ def test_the_field_of_a_box_pushes_where_the_distance_from_its_surface_grows(box
     seen = picture.obstacles(NOW, picture.at(NOW), prediction)
     distance = float(fixed.distance(here)[0])
     assume(abs(distance) > 1e-2)
-    if distance > reach(config):
-        assert not seen.ids
+    if not seen.ids:
+        assert distance > reach(config)
         return
     assert seen.d_min[0] == config.field.d_min
     force = repulsion(prediction, seen, 10.0, 7.0, None, 0.1)[0]
