@@ -160,7 +160,7 @@ class Autopilot:
             self._values,
             self._outbox,
             reporter,
-            records=config.streams == "normal",
+            records=config.streams != "quiet",
         )
         records.report(self._telemetry)
         if (further := further_rates(config)) is not None:
@@ -244,7 +244,7 @@ class Autopilot:
         self._reached = navigation.itinerary.reached
         self._work_due = self._services.next_due
         # A real ArduCopter sends HEARTBEAT at once after a mode change. Quiet flights do not.
-        self._announces = config.streams == "normal" and not self._firmware.bytewise
+        self._announces = config.streams != "quiet" and not self._firmware.bytewise
         self.not_encoded = 0
         """Number of messages that could not be encoded."""
         self._boot: int | None = None

@@ -70,7 +70,7 @@ class SnapshotReader:
         self._version = version(source, config.flavour)
         self._rotors = len(vehicle.rotors)
         self._hovering = _squares(hover_speeds(vehicle).tolist())
-        reported = config.streams == "normal" and config.flavour == "ardupilot"
+        reported = config.streams != "quiet" and config.flavour == "ardupilot"
         # MAVProxy takes a cleared bit as a breach, because ArduPilot always sets it.
         self._unbreached = mavlink.MAV_SYS_STATUS_GEOFENCE if reported else 0
         self._now = 0

@@ -27,6 +27,9 @@ _ARDUPILOT: Final = TelemetryRates(
     battery_status=1.0,
     home_position=0.5,
 )
+_NOTHING: Final = TelemetryRates(
+    **{name: 1.0 if name == "heartbeat" else 0.0 for name in TelemetryRates.model_fields}
+)
 # As recorded from PX4 1.16, but with lower rates of the fast streams: a client that needs 50 Hz requests it.
 _PX4: Final = TelemetryRates(
     sys_status=5.0,
@@ -94,7 +97,9 @@ def usual_rates(config: AutopilotConfig) -> TelemetryRates:
     """Return the rates of messages before any request."""
     if config.streams == "quiet":
         return config.rates
-    return _ARDUPILOT if config.flavour == "ardupilot" else _PX4
+    if config.flavour == "px4":
+        return _PX4
+    return _ARDUPILOT if config.streams == "normal" else _NOTHING
 
 
 def further_rates(config: AutopilotConfig) -> tuple[dict[int, float], float] | None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.frames import FleetFrame, ned_to_enu, yaw_to_enu
 from mavlink_bridge.messages import (
@@ -26,8 +28,10 @@ from mavlink_bridge.messages import (
     Message,
     Ping,
     RawImu,
+    RequestDataStream,
     SimState,
     Source,
+    StatusText,
     SysStatus,
     Timesync,
 )
@@ -168,6 +172,19 @@ def test_timesync_and_ping_are_answered():
     assert rig.all(Ping) == [Ping(Source(11, 1), 77, 5, *PILOT)]
     rig.step(Timesync(PILOT, 9, 123), Ping(PILOT, 77, 5, 11, 1))
     assert len(rig.all(Timesync)) == len(rig.all(Ping)) == 1
+
+
+def test_an_ardupilot_streams_nothing_before_a_request_and_then_what_was_requested():
+    rig, found = Rig("ardupilot", streams="asked"), []
+    for second in range(8):
+        begin = len(rig.received)
+        if second == 4:
+            rig.step(RequestDataStream(PILOT, 4, 11, 1, mavlink.MAV_DATA_STREAM_POSITION, 1))
+        rig.run(1.0)
+        found.append(Counter(type(message) for _, message in rig.received[begin:]))
+    assert found[0].keys() <= {Heartbeat, StatusText, Timesync, GpsGlobalOrigin}
+    assert found[2] == found[3] == {Heartbeat: 1}
+    assert found[6] == {Heartbeat: 1, LocalPosition: 4, GlobalPosition: 4}
 
 
 def test_timesync_of_a_client_with_an_autopilots_component_is_answered_and_an_autopilots_is_not():

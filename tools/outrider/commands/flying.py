@@ -143,7 +143,10 @@ def sitl(
     sensors: Annotated[str, typer.Option(help=SENSORS)] = "truth",
     physics: Annotated[str, typer.Option(help=PHYSICS)] = "own",
     startup: Annotated[
-        str, typer.Option(help="quick, or realistic: GPS and estimator take their time.")
+        str,
+        typer.Option(
+            help="quick, or realistic: GPS and estimator take their time, streams wait for requests."
+        ),
     ] = "quick",
     response: Annotated[str, typer.Option(help=RESPONSE)] = "firmware",
     origin: Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE[,ALTITUDE].")] = None,

@@ -147,16 +147,16 @@ class Request:
 
     def _config(self, index: int, epoch: int) -> AutopilotConfig:
         latitude, longitude, altitude = self.frame.to_geodetic(self.place(index))
-        changes: dict[str, object] = {}
+        changes: dict[str, object] = {"streams": "normal"}
         if self.startup == "realistic":
-            changes = {"startup": "in stages", "ready_after": _READY_AFTER_S[self.flavour]}
+            ready = _READY_AFTER_S[self.flavour]
+            changes = {"startup": "in stages", "ready_after": ready, "streams": "asked"}
         return AutopilotConfig(
             system_id=self.first_id + index,
             flavour=self.flavour,
             latitude=latitude,
             longitude=longitude,
             altitude=altitude,
-            streams="normal",
             sensors=self.sensors,
             physics=self.physics,
             response=self.response,
