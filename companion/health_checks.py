@@ -9,6 +9,7 @@ from companion.config import CompanionConfig
 from companion.estimation.time_sync import RoundTrips
 from companion.flight.health_monitor import Change, HealthInputs, HealthMonitor, Reaction
 from companion.flight.state_machine import Pilot
+from companion.goals.goals import Goals
 from companion.planning.avoidance import Avoidance
 from companion.telemetry.status_text import Severity, StatusReporter
 from companion.values.phase import STEERED
@@ -65,8 +66,9 @@ class HealthChecks:
         round_trips: RoundTrips,
         reporter: StatusReporter,
         fleet_clock: FleetClock | None,
+        goals: Goals,
     ) -> None:
-        self._fleet_clock = fleet_clock
+        self._fleet_clock, self._goals = fleet_clock, goals
         self._world, self._pilot, self._avoidance = world, pilot, avoidance
         self._round_trips, self._reporter = round_trips, reporter
         self.monitor = HealthMonitor(config)
@@ -117,6 +119,7 @@ class HealthChecks:
             world.neighbours.nearest(now, view.own),
             None if self._fleet_clock is None else self._fleet_clock.trouble,
             avoidance.refused(now),
+            self._goals.enclosed or avoidance.enclosed,
         )
 
     def _report_limits(self) -> None:

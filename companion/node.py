@@ -96,7 +96,14 @@ class Companion:
         self.round_trips = RoundTrips(own)
         self.reporter = StatusReporter(config.ground_messages, own)
         self._checks = HealthChecks(
-            config, world, pilot, self.avoidance, self.round_trips, self.reporter, self._fleet_clock
+            config,
+            world,
+            pilot,
+            self.avoidance,
+            self.round_trips,
+            self.reporter,
+            self._fleet_clock,
+            self._goals,
         )
         self.health = self._checks.monitor
         self._reports_on = config.ground_messages.texts or config.ground_messages.values

@@ -38,6 +38,7 @@ from companion.config.planning import (
     TurningSense,
 )
 from companion.config.target_source import GlobalPositionSource, TargetSource
+from companion.config.way import WayConfig
 from companion.surfaces import Circle, Surface, SurfaceConfig
 from companion.values.settings import Settings
 
@@ -102,6 +103,9 @@ class CompanionConfig(Settings):
         description="m: at this distance from the target its force begins; with target_d_min",
     )
     obstacles: tuple[Obstacle, ...] = Field((), max_length=MOST_OBSTACLES, description="fixed obstacles")
+    way: WayConfig | None = Field(
+        None, description="ways around fixed obstacles where they block the straight one; null: none"
+    )
     moving: tuple[Moving, ...] = Field(
         (), max_length=100, description="senders on the swarm link that are obstacles, and their sizes"
     )

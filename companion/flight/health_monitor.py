@@ -18,7 +18,7 @@ from companion.config import CompanionConfig
 from companion.flight.guard import Holding
 from companion.flight.vehicle import Vehicle
 from companion.telemetry.status_text import Severity
-from companion.values.phase import Phase
+from companion.values.phase import UNDER_WAY, Phase
 from companion.values.refused_senders import RefusedSenders
 from companion.world import View
 
@@ -50,7 +50,8 @@ class HealthInputs(NamedTuple):
     autopilot's clock has lost in total; ``unanswered``: the autopilot's messages are late, and it does not
     answer whether its clock is the reason; ``error``: distance (m) of the vehicle from its set-points;
     ``nearest``: system id and distance (m) of the nearest neighbour; ``time_trouble``: why fleet time is not
-    good enough to make plans; ``refused``: senders whose plans are refused.
+    good enough to make plans; ``refused``: senders whose plans are refused; ``enclosed``: fixed obstacles
+    leave no way to the destination.
     """
 
     now: int
@@ -70,6 +71,7 @@ class HealthInputs(NamedTuple):
     nearest: tuple[int, float] | None = None
     time_trouble: TimeTrouble | None = None
     refused: RefusedSenders = RefusedSenders()
+    enclosed: bool = False
 
 
 class Change(NamedTuple):
@@ -139,6 +141,7 @@ class HealthMonitor:
             self._late_messages(s),
             self._origin(s),
             self._fleet_time(s),
+            self._enclosed(s),
             *self._refused(s),
             *self._others(s),
         ]
@@ -285,6 +288,11 @@ class HealthMonitor:
         if s.time_trouble is None or s.phase in _ON_THE_GROUND:
             return None
         return Concern(f"fleet time {s.time_trouble.name}", s.time_trouble.value)
+
+    def _enclosed(self, s: HealthInputs) -> Concern | None:
+        if not s.enclosed or s.phase not in UNDER_WAY:
+            return None
+        return Concern("enclosed", "No way to the destination past obstacles")
 
     def _others(self, s: HealthInputs) -> list[Concern]:
         limit = self._config.guard.neighbour_lost_us

@@ -21,7 +21,8 @@ from companion.values.bearings import turned
 from companion.values.horizon import Array, Motion
 from companion.values.mates import Mates, Sight
 from companion.values.obstacles import Obstacles
-from companion.values.phase import Phase
+from companion.values.phase import UNDER_WAY, Phase
+from companion.ways import way_of
 from companion.world import View
 
 _RETURNED_WITHIN_M, _RETURNED_BELOW_M_S = 0.5, 0.5
@@ -105,11 +106,19 @@ class Goals:
         self._lane, self._clearance = 0.0, self._above_target(system)
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
+        # Committed plans have their ways from the ends of plans on.
+        least = config.field.d_min + config.field.margin(1)
+        self._way = way_of(config, least) if config.avoidance == "field" else None
         self.goal: Array | None = None
         """Ordered goal (3,) of the task ``goto``, m, fleet-local ENU.
 
         None: the goal is the position where steering began.
         """
+
+    @property
+    def enclosed(self) -> bool:
+        """Whether fixed obstacles leave no way to the destination, as far as goals have ways (field)."""
+        return self._way is not None and self._way.enclosed
 
     def begin(self, position: Array) -> None:
         """Record that steering begins, for the first time or again, at ``position`` (3,), m."""
@@ -152,12 +161,21 @@ class Goals:
         """
         step = self._config.guard.return_step
         self._lane = step * smaller_ids + self._clearance if step else 0.0
-        aim = self._destination(now, view, measured, obstacles, mates, sight)
+        aim = self._on_way(self._destination(now, view, measured, obstacles, mates, sight), measured)
         limit = self._config.guard.cautious_speed
         speed = inf if limit is None or not cautious else limit
         offset = aim.destination - (aim.target_end - aim.target) - measured.position
         speed = min(speed, pace(measured.position, offset))
         return aim if speed == inf else self._shortened(aim, measured, speed)
+
+    def _on_way(self, aim: Aim, measured: Motion) -> Aim:
+        """Return the aim at the sub-goal of the way where fixed obstacles block the straight one."""
+        if self._way is None or self._pilot.phase not in UNDER_WAY:
+            return aim
+        place = self._way.towards(measured.position, aim.destination).place
+        if place is not aim.destination:
+            aim = standing(place, aim.target)
+        return aim._replace(clear=self._way.clear)
 
     def _shortened(self, aim: Aim, measured: Motion, speed: float) -> Aim:
         """Return the aim in the same direction, but no further than ``speed`` (m/s) covers in a horizon.

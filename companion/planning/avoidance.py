@@ -79,6 +79,11 @@ class Avoidance(Protocol):
         ...
 
     @property
+    def enclosed(self) -> bool:
+        """Whether fixed obstacles leave no way to the destination, as far as avoidance has ways."""
+        ...
+
+    @property
     def tracking(self) -> Tracking:
         """Tracking of the set-points by the vehicle."""
         ...

@@ -129,6 +129,11 @@ class CertifiedAvoidance:
         flight = self._flight
         return self._pilot.stance.grounded and flight.commitment.column and not flight.reservation.joined
 
+    @property
+    def enclosed(self) -> bool:
+        """Whether fixed obstacles leave no way to the destination."""
+        return self._flight.enclosed
+
     def pause(self, gap: int) -> None:
         """Do nothing: a committed plan stays valid."""
 

@@ -34,6 +34,7 @@ class FieldAvoidance:
     """
 
     parked = False
+    enclosed = False
 
     def __init__(self, config: CompanionConfig, world: World, pilot: Pilot, times: PlanTimes) -> None:
         self._config, self._world, self._pilot, self._times = config, world, pilot, times

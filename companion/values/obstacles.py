@@ -45,6 +45,20 @@ class Obstacles(NamedTuple):
             np.concatenate([np.broadcast_to(part.heights, len(part.ids)) for part in (self, others)]),
         )
 
+    def without(self, ids: range) -> Obstacles:
+        """Return the obstacles whose ids are not among ``ids``."""
+        kept = [row for row, id_ in enumerate(self.ids) if id_ not in ids]
+        if len(kept) == len(self.ids):
+            return self
+        return Obstacles(
+            tuple(self.ids[row] for row in kept),
+            self.positions[kept],
+            self.d_min[kept],
+            self.d_safe[kept],
+            np.broadcast_to(self.radius, len(self.ids))[kept],
+            np.broadcast_to(self.heights, len(self.ids))[kept],
+        )
+
     def shared(self, systems: Collection[int], spacing: float) -> Obstacles:
         """Return the obstacles with d_safe of those of ``systems`` lowered to ``spacing`` (m).
 

@@ -19,5 +19,7 @@ class Phase(Enum):
     YIELDED = "yielded"
 
 
+UNDER_WAY = (Phase.ESCORT, Phase.RETURN)
+"""Phases in which a vehicle flies to a destination; while it holds or settles it stays about where it is."""
 STEERED = (Phase.ESCORT, Phase.HOLD, Phase.RETURN, Phase.SETTLE)
 """Phases in which set-points steer, as long as the autopilot follows them."""

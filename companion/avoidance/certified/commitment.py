@@ -22,12 +22,12 @@ from companion.avoidance.certified.committed import (
     rounding,
 )
 from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
-from companion.avoidance.certified.detour import Subgoal
 from companion.avoidance.certified.qp import Objective, SeparationQp, State
 from companion.avoidance.certified.separating_planes import Others, kept, planes
 from companion.config.certified import CertifiedConfig
 from companion.errors import CertificateError, CompanionError, SolverError
 from companion.values.horizon import Array, Horizon, Motion
+from companion.ways.subgoal import Subgoal
 from mavlink_bridge.wire.plan import WirePlan, quantise
 
 

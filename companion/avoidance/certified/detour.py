@@ -12,25 +12,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
 from companion.avoidance.certified.visibility_graph import Discs, free, way, without
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Array
+from companion.ways.subgoal import Subgoal
 
 _EVERY_US = 1_000_000
 """Shortest time (µs) between two searches, which take some milliseconds among twenty discs."""
 _MOVED_M = 0.5
 """Distance by which the goal may move before the way is searched anew."""
-
-
-class Subgoal(NamedTuple):
-    """Place (3,), m, to aim for now; ``beyond`` (m): length of the way from there to the goal."""
-
-    place: Array
-    beyond: float
 
 
 class Detour:

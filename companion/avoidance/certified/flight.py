@@ -14,15 +14,17 @@ from companion.avoidance.certified.commitment import Commitment, HoldReason
 from companion.avoidance.certified.committed import rest_time
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
-from companion.avoidance.certified.detour import Detour, Subgoal
+from companion.avoidance.certified.detour import Detour
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import beside, further
+from companion.avoidance.certified.margins import beside, further, margin
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.reservation import Reservation
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
+from companion.ways import way_of
+from companion.ways.subgoal import Subgoal
 from companion.world import View, World
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame
@@ -34,6 +36,8 @@ from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack
 
 _TURNING_SENSES = {"left": -1.0}
+_BESIDE_M, _EFFORT = 0.05, 2
+"""Distance (m) of a way from what plans must keep clear of, and how much of a search is done for a plan."""
 
 
 class CertifiedFlight:
@@ -52,6 +56,9 @@ class CertifiedFlight:
         )
         self._sources = ConstraintSources(config, steps)
         self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
+        # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
+        least = config.field.d_min + margin(certified, config.field, config.limits) + _BESIDE_M
+        self._way = way_of(config, least, _EFFORT)
         between = self._sources.between
         downwash = config.field.downwash
         distances = Distances(between, further(certified), steps, planar=config.planar, downwash=downwash)
@@ -263,6 +270,11 @@ class CertifiedFlight:
         self._outside = outside
 
     @property
+    def enclosed(self) -> bool:
+        """Whether fixed obstacles leave no way from the end of the plan to the destination."""
+        return self._way is not None and self._way.enclosed
+
+    @property
     def lost(self) -> bool:
         """Whether the vehicle is further than ``guard.tube`` (m) from its plan: planning then begins anew."""
         return self.deviation > self._config.guard.tube
@@ -286,17 +298,19 @@ class CertifiedFlight:
 
     def _subgoal(self, now: int, epoch: int, rest: Array, destination: Array) -> Subgoal:
         """Return where the plan should end: ``destination`` (3,), m, or a place on a way round to it."""
-        begun = self._detour.begun
-        subgoal = self._detour.towards(
+        way, detour = self._way, self._detour
+        begun = detour.begun, 0 if way is None else way.begun
+        goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
+        subgoal = detour.towards(
             now,
             rest,
-            destination,
-            lambda: self._sources.resting(epoch, rest, destination, self.agreements),
+            goal.place,
+            lambda: self._sources.resting(epoch, rest, goal.place, self.agreements),
             stalled=self._deadlock_turn.stalled,
         )
-        if self._detour.begun != begun:
+        if (detour.begun, 0 if way is None else way.begun) != begun:
             self._deadlock_turn.restart()
-        return subgoal
+        return subgoal._replace(beyond=subgoal.beyond + goal.beyond)
 
     def _anticipated(self, epoch: int, own: Array, goal: Array) -> float:
         """Return the turn (rad) of ``goal`` (3,), m, for encounters with the peers' newest plans.

@@ -18,6 +18,7 @@ from companion.avoidance.field.methods.tangential import Tangential
 from companion.avoidance.field.walls import Walls
 from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig, MethodName
+from companion.obstacles.static import FIRST_ID
 from companion.surfaces import Surface
 from companion.values.horizon import Array, Horizon, roll_out
 from companion.values.obstacles import Obstacles
@@ -32,7 +33,8 @@ class Aim(NamedTuple):
     ``destination`` x̌ (3,) and terminal ``velocity`` (3,); ``target`` (3,) now and ``target_end`` (3,) at the
     end of the horizon. ``surface`` is the one that x̌ lies on, None for a goal. ``spacing``: distance (m)
     that vehicles that share the surface shall keep; ∞ where it is not shared. ``path`` gives the places and
-    velocities of a destination that moves after times (n,), s, from now; None for one at rest.
+    velocities of a destination that moves after times (n,), s, from now; None for one at rest. ``clear``:
+    no fixed obstacle is between the vehicle and x̌, which is on a way around them.
     """
 
     destination: Array
@@ -42,6 +44,7 @@ class Aim(NamedTuple):
     surface: Surface | None = None
     spacing: float = inf
     path: Callable[[Array], tuple[Array, Array]] | None = None
+    clear: bool = False
 
 
 def standing(goal: Array, target: Array | None = None) -> Aim:
@@ -69,6 +72,7 @@ class Planner:
         self.config = config
         self._limit(config.limits.within(config.field.margin(1)))
         self._methods = build(config)
+        self._fixed = range(FIRST_ID, FIRST_ID + len(config.obstacles))
         self._gradient: Array = np.zeros(3)
         self._force: Array = np.zeros((config.horizon.steps + 1, 3))
         self._planned_at: int | None = None
@@ -131,7 +135,7 @@ class Planner:
             aim.surface,
         )
         elapsed = self._elapsed(now)
-        influence = self._influence(elapsed, scene)
+        influence = self._influence(elapsed, scene, clear=aim.clear)
         problem = self.dqmpc.problem(
             position,
             velocity,
@@ -157,7 +161,7 @@ class Planner:
         last, self._planned_at = self._planned_at, now
         return inf if last is None else (now - last) * 1e-6
 
-    def _influence(self, elapsed: float, scene: Scene) -> Influence:
+    def _influence(self, elapsed: float, scene: Scene, *, clear: bool) -> Influence:
         config = self.config
         a_total = config.limits.a_total
         field = repulsion(
@@ -171,6 +175,9 @@ class Planner:
             config.field.turn * _SIGNS[config.turning_sense],
         )
         influence = Influence(field, 1.0, scene.destination)
+        if clear:
+            # The methods lead around what is in the way: nothing fixed is.
+            scene = scene._replace(obstacles=scene.obstacles.without(self._fixed))
         for method in self._methods:
             influence = method.influence(scene, influence)
         force = influence.force

@@ -1,0 +1,215 @@
+"""Ways: free of obstacles, no longer than they must be, as much room as there is, the same every time; and a
+point that follows them arrives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from companion.config.planning import LimitsConfig
+from companion.ways.finding import finding
+from companion.ways.search import Search
+from tests.companion.ways.worlds import (
+    BOX,
+    LEAST,
+    POCKET,
+    RING,
+    clearances,
+    drawn,
+    flown,
+    free_places,
+    least,
+    length,
+    post,
+    result,
+    row,
+    way,
+)
+
+NORTH, UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+INSIDE, BEHIND = np.array([0.0, 0.5, 5.0]), np.array([8.0, -0.5, 5.0])
+WALL = row((0.0, -9.9), (0.0, 4.0))
+"""With a box of 10 m it leaves an opening in the north."""
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_way_keeps_its_clearance_and_is_about_as_short_as_the_cells_allow(seed: int) -> None:
+    obstacles = drawn(seed)
+    ends = free_places(obstacles, 1.0, seed)
+    clear = clearances(obstacles)
+    found = result(finding(clear, (0.5,), *ends))
+    assert found is not None
+    assert (found.corners[[0, -1]] == ends).all()
+    assert least(obstacles, found.corners) >= 0.5 - 1e-9
+    straight = float(np.linalg.norm(ends[1] - ends[0]))
+    search = Search(clear, 0.5, *clear.grid.nearest(ends).tolist())
+    search.go_on(10**9)
+    # The ends are at most half a diagonal away from their cells.
+    over_cells = search.length + np.sqrt(3.0) * clear.grid.cell
+    assert straight - 1e-9 <= length(found.corners) <= over_cells
+    if clear.free(*ends, 0.6):
+        assert length(found.corners) == pytest.approx(straight)
+    low, high = np.array(BOX.box_min), np.array(BOX.box_max)
+    assert ((found.corners >= low) & (found.corners <= high)).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_way_is_about_as_long_back_and_in_a_mirror_and_the_same_again(seed: int) -> None:
+    obstacles = [one for one in drawn(seed, 45) if one.kind == "post"]
+    image = [one.model_copy(update={"at": (one.at[0], -one.at[1])}) for one in obstacles]
+    ends = free_places(obstacles, 1.0, seed)
+    there = result(finding(clearances(obstacles), (0.5,), *ends)).corners
+    again = result(finding(clearances(obstacles), (0.5,), *ends)).corners
+    back = result(finding(clearances(obstacles), (0.5,), *ends[::-1])).corners
+    mirror = result(finding(clearances(image), (0.5,), *(ends * [1.0, -1.0, 1.0]))).corners
+    assert there.tobytes() == again.tobytes()
+    assert length(back) == pytest.approx(length(there), rel=0.05)
+    assert length(mirror) == pytest.approx(length(there), rel=0.05)
+
+
+@pytest.mark.parametrize(("opening", "level"), [(6.0, 0), (2.6, 1), (1.9, 2), (0.8, None)])
+def test_a_way_has_as_much_room_as_there_is(opening: float, level: int | None) -> None:
+    """Through the opening of a wall, from surface to surface, with a clearance of 1.6, 1.1 or 0.6 m."""
+    side = 0.5 * opening + 0.3
+    wall = [*row((0.0, -10.5), (0.0, -side)), *row((0.0, side), (0.0, 10.5))]
+    tried = [LEAST + share for share in (1.0, 0.5, 0.0)]
+    found = result(finding(clearances(wall), tried, np.array([-6.0, 3.0, 5.0]), np.array([6.0, 3.0, 5.0])))
+    if level is None:
+        assert found is None
+        return
+    assert found.level == level
+    assert least(wall, found.corners) >= tried[level] - 1e-9
+
+
+def test_a_point_leaves_the_pocket_and_goes_straight_where_it_can() -> None:
+    leads = way(POCKET)
+    places = flown(leads, INSIDE, BEHIND)
+    assert np.abs(places[-1] - BEHIND).max() < 1e-6
+    assert leads.begun == 1
+    assert least(POCKET, places) > LEAST
+    assert places[:, 0].min() < -4.0
+    # Through the open end, about half the U, and straight to the goal: 26 m and what the clearance adds.
+    assert 26.0 < length(places) < 34.0
+    # The other way round there is nothing to leave.
+    free = way(POCKET)
+    assert free.towards(INSIDE, INSIDE - [8.0, 0.0, 0.0]).beyond == 0.0
+    assert free.begun == 0
+    assert free.clear
+
+
+def test_while_it_searches_the_vehicle_aims_at_the_goal_as_without_a_way() -> None:
+    leads = way(POCKET, parts=1)
+    searching = 0
+    while leads.begun == 0:
+        subgoal = leads.towards(INSIDE, BEHIND)
+        searching += leads.begun == 0
+        assert (subgoal.place is BEHIND) == (leads.begun == 0) == (not leads.clear)
+    assert searching > 5
+    # The number of plans that a search takes is that of its parts.
+    faster = way(POCKET, parts=5)
+    plans = 0
+    while faster.begun == 0:
+        faster.towards(INSIDE, BEHIND)
+        plans += 1
+    assert plans == -(-(searching + 1) // 5)
+
+
+def test_out_of_a_ring_there_is_no_way_and_the_vehicle_does_as_before() -> None:
+    leads = way(RING)
+    for _ in range(40):
+        subgoal = leads.towards(INSIDE, BEHIND)
+        assert subgoal.place is BEHIND
+        assert not leads.clear
+    assert leads.enclosed
+    assert leads.begun == 0
+    # It does not search on for ever, but again when the destination has moved.
+    assert leads._search is None
+    leads.towards(INSIDE, BEHIND + NORTH)
+    assert leads._search is not None
+    leads.towards(INSIDE, INSIDE - NORTH)
+    assert not leads.enclosed
+
+
+def test_the_box_bounds_the_ways() -> None:
+    start, goal = np.array([-6.0, -4.0, 5.0]), np.array([6.0, -4.0, 5.0])
+    places = flown(way(WALL), start, goal)
+    assert np.abs(places[-1] - goal).max() < 1e-6
+    assert places[:, 1].max() < 10.0
+    closed = way(WALL, BOX.model_copy(update={"box_max": (10.0, 4.4, 8.0)}))
+    assert len(np.unique(flown(closed, start, goal, steps=100), axis=0)) == 1
+    assert closed.enclosed
+
+
+def test_a_low_wall_is_passed_above_except_by_a_vehicle_that_keeps_its_height() -> None:
+    low = [one.model_copy(update={"height": 4.5}) for one in row((0.0, -10.5), (0.0, 10.5))]
+    start, goal = np.array([-6.0, 0.0, 4.0]), np.array([6.0, 0.0, 4.0])
+    places = flown(way(low), start, goal)
+    assert np.abs(places[-1] - goal).max() < 1e-6
+    assert places[:, 2].max() > 4.5 + LEAST
+    planar = way(low, planar=True)
+    flown(planar, start, goal, steps=50)
+    assert planar.enclosed
+    around = way(low[: len(low) // 2], planar=True)
+    places = flown(around, start, goal + UP)
+    assert np.abs(places[-1] - goal)[:2].max() < 1e-6
+    assert around.begun == 1
+
+
+def test_a_destination_that_moves_keeps_its_way_while_a_corner_sees_it() -> None:
+    leads = way(WALL)
+    place, goal = np.array([-6.0, -4.0, 5.0]), np.array([5.0, -8.0, 5.0])
+    ways, gap = set(), np.inf
+    for _ in range(400):
+        goal = goal + 0.02 * NORTH
+        towards = leads.towards(place, goal).place - place
+        ways.add(leads.begun)
+        if leads.clear:
+            place = place + towards * min(1.0, 0.1 / float(np.linalg.norm(towards)))
+        gap = float(np.linalg.norm(goal - place))
+    assert ways == {0, 1}
+    assert gap < 0.1
+    # One that goes behind another wall gets another way.
+    walls = [*WALL, *row((0.0, 4.0), (9.0, 4.0))]
+    other = way(walls)
+    start, goal = np.array([6.0, 0.0, 5.0]), np.array([6.0, 2.0, 5.0])
+    assert other.towards(start, goal).place is goal
+    while other.begun == 0:
+        other.towards(start, np.array([5.0, 7.0, 5.0]))
+        if other.enclosed:
+            break
+    assert other.enclosed or other.begun == 1
+
+
+def test_a_vehicle_pushed_aside_gets_back_to_its_way_or_another() -> None:
+    leads = way(POCKET)
+    places = flown(leads, INSIDE, BEHIND, steps=40)
+    pushed = np.array([-2.0, 3.0, 6.0])
+    assert leads.begun == 1
+    assert places[-1][0] < INSIDE[0]
+    rest = flown(leads, pushed, BEHIND)
+    assert np.abs(rest[-1] - BEHIND).max() < 1e-6
+    # Pushed over the wall it is where its way does not lead.
+    leads = way(POCKET)
+    flown(leads, INSIDE, BEHIND, steps=30)
+    outside = flown(leads, np.array([0.0, 8.0, 5.0]), BEHIND)
+    assert np.abs(outside[-1] - BEHIND).max() < 1e-6
+    assert outside[:, 0].min() > -2.0
+
+
+def test_near_an_obstacle_a_vehicle_still_finds_its_way() -> None:
+    """A tenth of a metre from a wall, inside of what a way keeps away from."""
+    leads = way(POCKET)
+    places = flown(leads, np.array([3.6, 0.0, 5.0]), np.array([4.45, 1.0, 5.0]))
+    assert leads.begun == 1
+    assert np.abs(places[-1] - [4.45, 1.0, 5.0]).max() < 1e-6
+
+
+def test_large_boxes_have_larger_cells_and_ways_all_the_same() -> None:
+    wide = LimitsConfig(box_min=(-200.0, -200.0, 2.0), box_max=(200.0, 200.0, 40.0))
+    wall = [post(0.0, y, 4.0) for y in np.arange(-200.0, 100.0, 7.0).tolist()]
+    leads = way(wall, wide, most_cells=20_000)
+    start, goal = np.array([-50.0, 0.0, 10.0]), np.array([50.0, 0.0, 10.0])
+    places = flown(leads, start, goal, by=1.0)
+    assert np.abs(places[-1] - goal).max() < 1e-6
+    assert least(wall, places) > LEAST
