@@ -124,6 +124,7 @@ LIMITS = {
     "another fleet file": ("differing", {}, {"refused": RefusedSenders(differing=(12,))}, TELL),
     "a wrong clock": ("peer", {}, {"refused": RefusedSenders(wrong_clock=(12,))}, TELL),
     "two vehicles with an id": ("doubled", {}, {"refused": RefusedSenders(doubled=(12,))}, TELL),
+    "no way to the destination": ("enclosed", {}, {"enclosed": True}, TELL),
     "who took it over": ("custody", {"phase": Phase.ESCORT}, {"phase": Phase.YIELDED}, TELL),
 }
 

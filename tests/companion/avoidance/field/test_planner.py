@@ -9,12 +9,14 @@ from hypothesis import strategies as st
 
 from companion.avoidance.field.planner import Aim, Planner, standing
 from companion.config import CompanionConfig
+from companion.obstacles.static import FIRST_ID
 from tests.companion.rig import QUICK, ZERO, fly, obstacles, ring
 
 CONFIG = CompanionConfig()
 START = 1_767_225_600_000_000
 DT = CONFIG.horizon.dt_us
 SEEDS = st.integers(0, 2**32 - 1)
+EAST = np.array([1.0, 0.0, 0.0])
 MIRROR = np.diag([1.0, -1.0, 1.0])
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -198,3 +200,28 @@ def test_the_field_goes_on_from_where_the_last_plan_saw_it(seed, later):
     seen = first.force[min(later // DT, 15)]
     assert np.linalg.norm(second.force[0] - seen) <= jerk * 1e-6 * min(later, DT) + 1e-9
     assert np.linalg.norm(second.force[0]) >= np.linalg.norm(seen) - 1e-9
+
+
+def test_on_a_way_no_method_turns_a_vehicle_aside_for_a_fixed_obstacle_but_the_field_repels_it():
+    """A post and a neighbour on either side of the course, at the same distance."""
+    post = {"kind": "post", "at": (3.5, 0.8), "radius": 0.5}
+    beside = obstacles([[3.5, 0.8, 5.0], [3.5, -0.8, 5.0]])
+    seen = beside._replace(ids=(FIRST_ID, 5), radius=np.array([0.5, 0.0]))
+    here, alone = np.array([0.0, 0.0, 5.0]), seen.without(range(FIRST_ID, FIRST_ID + 1))
+    assert alone.ids == (5,)
+    aim = standing(np.array([9.0, 0.0, 5.0]))
+    config = configured(obstacles=(post,), methods=("tangential",), turning_sense="right")
+    without = configured(obstacles=(post,), methods=("baseline",))
+
+    def forces(settings, others, *, clear):
+        planner, prediction = Planner(settings), np.tile(here, (16, 1)) + np.linspace(0, 2, 16)[:, None] * EAST
+        for now in (START, START + DT):  # the second has a gradient, which the methods need
+            plan = planner.plan(now, here, 2.0 * EAST, prediction, aim._replace(clear=clear), others)
+        return plan.force
+
+    field = forces(without, seen, clear=True)
+    only_post = seen.without(range(5, 6))
+    assert np.array_equal(forces(config, only_post, clear=True), forces(without, only_post, clear=True))
+    assert not np.allclose(forces(config, only_post, clear=False), forces(without, only_post, clear=False))
+    assert not np.allclose(forces(config, seen, clear=True), field)
+    assert np.array_equal(forces(config, alone, clear=True), forces(config, alone, clear=False))

@@ -1,0 +1,133 @@
+"""A companion among posts that it knows: it flies around them to goals, back to its start and to a target."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from companion.obstacles.static import FixedObstacles
+from companion.values.horizon import Array
+from companion.values.phase import Phase
+from mavlink_bridge.messages import StatusText
+from tests.companion.bench import TARGET, Bench, only, seen_at
+from tests.companion.ways.worlds import POCKET, RING
+
+BEHIND = (10.0, 0.5, 5.0)
+LIMITS = {"box_min": [-14.0, -12.0, 3.0], "box_max": [14.0, 12.0, 8.0]}
+NO_WAY = "No way to the destination past obstacles"
+
+
+def bench(obstacles: Any = POCKET, **settings: Any) -> Bench:
+    return Bench(
+        start=(-1.0, 0.0, 0.0),
+        obstacles=[one.model_dump() for one in obstacles],
+        limits=LIMITS,
+        **{"way": {}, **settings},
+    )
+
+
+def flown(of: Bench, seconds: float, place: Any) -> Array:
+    """Fly until it is there, or for so long; the places, at each step."""
+    places = []
+    for _ in range(round(100 * seconds)):
+        of.step()
+        places.append(of.autopilot.position.copy())
+        if np.linalg.norm(places[-1] - place) < 0.3:
+            break
+    return np.array(places)
+
+
+def off(of: Bench, place: Any) -> float:
+    return float(np.linalg.norm(of.autopilot.position - np.asarray(place)))
+
+
+def test_it_flies_out_of_a_pocket_to_its_goal_and_back_to_its_start() -> None:
+    of = bench().take_off()
+    of.go_to(BEHIND)
+    places = flown(of, 30.0, BEHIND)
+    assert off(of, BEHIND) < 0.3
+    assert FixedObstacles(tuple(POCKET)).distance(places).min() > of.config.field.d_min
+    assert ((places > np.array(LIMITS["box_min"]) - 1e-3) & (places < LIMITS["box_max"])).all()
+    of.order(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    of.until(Phase.SETTLE, 40.0)
+    assert np.linalg.norm(of.autopilot.position[:2] - [-1.0, 0.0]) < 1.0
+
+
+def test_without_ways_it_stays_in_the_pocket() -> None:
+    of = bench(way=None).take_off()
+    of.go_to(BEHIND)
+    flown(of, 15.0, BEHIND)
+    assert off(of, BEHIND) > 4.0
+
+
+def test_it_stays_where_it_is_told_to_although_it_is_under_way() -> None:
+    of = bench().take_off()
+    of.go_to(BEHIND)
+    of.fly(4.0)
+    of.order(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
+    of.fly(4.0)
+    place = of.autopilot.position.copy()
+    of.fly(2.0)
+    assert off(of, place) < 0.1
+    assert off(of, BEHIND) > 5.0
+
+
+@pytest.mark.parametrize("ways", [True, False])
+def test_it_gets_to_a_target_that_flies_behind_the_wall(ways: bool) -> None:
+    """The target appears behind the U, and flies on along it at 1 m/s."""
+    of = bench(
+        task="escort", surface={"kind": "circle", "radius": 2.0, "height": 5.0}, way={} if ways else None
+    )
+    of.target = seen_at(TARGET, (-3.0, 0.0, 0.0))
+    of.take_off()
+    place = np.array([10.0, 4.0, 0.0])
+    for _ in range(1000):
+        place[1] -= 0.01
+        of.target = seen_at(TARGET, place, (-1.0, 0.0, 0.0))
+        of.step()
+    of.target = seen_at(TARGET, place)
+    of.fly(5.0)
+    standoff = float(np.linalg.norm(of.autopilot.position[:2] - place[:2]))
+    assert abs(standoff - 2.0) < 0.3 if ways else standoff > 4.0
+
+
+def test_where_there_is_no_way_the_ground_is_told_until_there_is_one() -> None:
+    of = bench(RING, ground_messages={"texts": True}).take_off()
+
+    def told(seconds: float) -> list[str]:
+        return [text.text for _ in range(round(100 * seconds)) for text in only(StatusText, of.step(), "ground")]
+
+    of.go_to(BEHIND)
+    texts = told(4.0)
+    assert [text for text in texts if NO_WAY in text] == [NO_WAY]
+    assert NO_WAY in {one.text for one in of.companion.health.concerns.values()}
+    of.go_to((0.5, 1.0, 5.0))
+    told(2.0)
+    assert not of.companion.health.concerns
+    assert off(of, (0.5, 1.0, 5.0)) < 1.0
+
+
+LOADED = """
+import sys
+from companion.config import CompanionConfig
+from companion.node import Companion
+from mavlink_bridge.frames import FleetFrame
+post = {"kind": "post", "at": [4.0, 0.0], "radius": 0.3}
+for settings in ({"obstacles": [post]}, {"way": {}}):
+    for avoidance in ("field", "certified"):
+        config = CompanionConfig.model_validate({**settings, "avoidance": avoidance})
+        Companion(config, 11, 1, FleetFrame(47.0, 8.0, 400.0), lambda: 0)
+print(*sys.modules)
+"""
+
+
+def test_a_companion_that_needs_no_ways_loads_no_search() -> None:
+    done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert "companion.ways" in loaded
+    assert not loaded & {"companion.ways.way", "companion.ways.search", "companion.ways.lines"}
