@@ -43,3 +43,9 @@ def test_its_rough_world_is_one() -> None:
     found = shown("antipodal-8", 2)
     assert found.faults
     assert found.weather.wind == (6.0, 0.0, 0.0)
+
+
+def test_its_way_can_be_switched_on() -> None:
+    blocks = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    (number,) = [number for number, block in enumerate(blocks) if "  way:" in block]
+    assert shown("scenario-1", number).companion.way is not None

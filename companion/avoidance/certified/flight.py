@@ -297,7 +297,10 @@ class CertifiedFlight:
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 
     def _subgoal(self, now: int, epoch: int, rest: Array, destination: Array) -> Subgoal:
-        """Return where the plan should end: ``destination`` (3,), m, or a place on a way round to it."""
+        """Return where the plan should end: ``destination`` (3,), m, or a place on a way round to it.
+
+        That is the way around fixed obstacles, and a detour on it around what rests.
+        """
         way, detour = self._way, self._detour
         begun = detour.begun, 0 if way is None else way.begun
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)

@@ -100,7 +100,9 @@ def test_where_there_is_no_way_the_ground_is_told_until_there_is_one() -> None:
     of = bench(RING, ground_messages={"texts": True}).take_off()
 
     def told(seconds: float) -> list[str]:
-        return [text.text for _ in range(round(100 * seconds)) for text in only(StatusText, of.step(), "ground")]
+        return [
+            text.text for _ in range(round(100 * seconds)) for text in only(StatusText, of.step(), "ground")
+        ]
 
     of.go_to(BEHIND)
     texts = told(4.0)

@@ -214,7 +214,10 @@ def test_on_a_way_no_method_turns_a_vehicle_aside_for_a_fixed_obstacle_but_the_f
     without = configured(obstacles=(post,), methods=("baseline",))
 
     def forces(settings, others, *, clear):
-        planner, prediction = Planner(settings), np.tile(here, (16, 1)) + np.linspace(0, 2, 16)[:, None] * EAST
+        planner, prediction = (
+            Planner(settings),
+            np.tile(here, (16, 1)) + np.linspace(0, 2, 16)[:, None] * EAST,
+        )
         for now in (START, START + DT):  # the second has a gradient, which the methods need
             plan = planner.plan(now, here, 2.0 * EAST, prediction, aim._replace(clear=clear), others)
         return plan.force
