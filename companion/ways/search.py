@@ -8,7 +8,8 @@ it follows one, instead of all, and the way found is at most 1/1000 longer than 
 A cell may be followed by a neighbour at a distance L if both have a clearance of √(r² + L²/4) or more: then
 all of the line between them has a clearance of r (``clearance.py``). Ties are broken by the number of the
 cell, so that the result is the same everywhere. The search is an own one, because those of libraries cannot
-be interrupted: a plan is due every 20 ms, and a large grid takes longer. Tests compare it with SciPy's.
+be interrupted, and a plan is due every 20 ms: SciPy's Dijkstra takes 45 ms for 138 000 cells, and 350 ms to
+make the graph. Tests compare the two.
 """
 
 from __future__ import annotations
