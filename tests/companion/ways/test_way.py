@@ -7,7 +7,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from companion.config.obstacles import Box, Wall
 from companion.config.planning import LimitsConfig
+from companion.obstacles.static import FixedObstacles
 from companion.ways.finding import finding
 from companion.ways.search import Search
 from tests.companion.ways.worlds import (
@@ -213,3 +215,34 @@ def test_large_boxes_have_larger_cells_and_ways_all_the_same() -> None:
     places = flown(leads, start, goal, by=1.0)
     assert np.abs(places[-1] - goal).max() < 1e-6
     assert least(wall, places) > LEAST
+
+
+@pytest.mark.parametrize("thickness", [0.02, 0.5])
+def test_a_wall_thinner_than_a_cell_is_a_wall(thickness: float) -> None:
+    """Two walls with openings at alternate ends, and one that closes the box."""
+    walls = [
+        Wall(kind="wall", ends=((-3.0, -10.5), (-3.0, 5.0)), thickness=thickness),
+        Wall(kind="wall", ends=((3.1, 10.5), (3.1, -5.0)), thickness=thickness),
+    ]
+    start, goal = np.array([-3.4, -4.0, 5.0]), np.array([6.0, 4.0, 5.0])
+    leads = way(walls)
+    places = flown(leads, start, goal)
+    assert leads.begun == 1
+    assert np.abs(places[-1] - goal).max() < 1e-6
+    # It begins nearer to a wall than a way may be, and never gets nearer.
+    assert least(walls, places) >= float(FixedObstacles(walls).distance(start).min()) - 1e-9
+    assert places[:, 1].max() > 5.0
+    closed = way([*walls, Wall(kind="wall", ends=((0.0, -10.5), (0.0, 10.5)), thickness=thickness)])
+    flown(closed, start, goal, steps=300)
+    assert closed.enclosed
+
+
+def test_among_thousands_of_boxes_each_cell_is_compared_with_those_near_it() -> None:
+    random = np.random.default_rng(5)
+    places = random.uniform([-9.5, -9.5, 2.5], [9.5, 9.5, 8.5], (3000, 3)).tolist()
+    boxes = [Box(kind="box", at=(x, y, z), size=(0.2, 0.3, 0.1), yaw_deg=25.0) for x, y, z in places]
+    clear = clearances(boxes, most=0.8)
+    some = clear.grid.places(random.integers(0, len(clear.grid), 60))
+    wanted = np.minimum(FixedObstacles(boxes).distance(some).min(axis=1), 0.8)
+    assert np.allclose(clear.cells[clear.grid.nearest(some)], wanted, atol=1e-9)
+    assert np.allclose(clear.at(some), wanted, atol=1e-9)
