@@ -103,7 +103,22 @@ class FusedSource(Settings):
     sigma_bearing_deg: float = Field(
         0.3, gt=0.0, le=45.0, description="degrees, σ across the ray, where a camera does not say"
     )
-    sigma_acceleration: Positive = Field(1.0, description="m/s², of the target's white acceleration")
+    sigma_acceleration: Positive = Field(
+        1.0, description="m/s², of the target's horizontal acceleration, each axis; the least that is assumed"
+    )
+    sigma_climb: Positive = Field(0.2, description="m/s², of its vertical acceleration")
+    acceleration_s: float = Field(
+        1.0, ge=0.1, le=100.0, description="s, time constant of the acceleration's autocorrelation"
+    )
+    adapt: float = Field(
+        20.0,
+        ge=1.0,
+        le=1000.0,
+        description="factor by which both σ grow at most, if detections show more acceleration; 1: none",
+    )
+    adapt_s: float = Field(
+        10.0, ge=0.1, le=3600.0, description="s, time constant at which they forget detections"
+    )
     own_errors: OwnErrors | None = Field(
         None, description="of every vehicle; null: of the scenario's sensors, otherwise those of GNSS"
     )

@@ -51,7 +51,7 @@ def detection(
     distance = float(np.sqrt(ray @ ray))
     if not 1e-3 < distance <= _MAX_DISTANCE_M:
         return None
-    across, along = _accuracies(config, distance, message)
+    across, along = _accuracies(config, distance, hypot(ray[0], ray[1]), message)
     if not (0.0 < across <= _MAX_SIGMA_M and 0.0 < along <= _MAX_SIGMA_M):
         return None
     errors = config.errors
@@ -73,16 +73,20 @@ def detection(
     return Detection(vehicle, time, fields, estimate, weight, message)
 
 
-def _accuracies(config: FusedSource, distance: float, message: CameraTrackingGeo) -> tuple[float, float]:
+def _accuracies(
+    config: FusedSource, distance: float, level: float, message: CameraTrackingGeo
+) -> tuple[float, float]:
     """Return σ across and along the ray, m; ∞ for absurd ones.
 
     What the camera does not say is as configured.
     """
     heading = message.heading_accuracy
     horizontal, vertical = message.horizontal_accuracy, message.vertical_accuracy
-    if heading is not None and not 0.0 < heading <= _MAX_BEARING_RAD:
+    # The accuracy of a heading is an angle in the horizontal plane.
+    bearing = radians(config.sigma_bearing_deg) if heading is None else heading * level / distance
+    if heading is not None and not 0.0 < bearing <= _MAX_BEARING_RAD:
         return inf, inf
-    across = max(distance * (radians(config.sigma_bearing_deg) if heading is None else heading), _MIN_SIGMA_M)
+    across = max(distance * bearing, _MIN_SIGMA_M)
     if horizontal is None or vertical is None:
         return across, max(distance * config.sigma_range_share, across)
     if not (0.0 < horizontal <= _MAX_SIGMA_M and 0.0 < vertical <= _MAX_SIGMA_M):

@@ -9,19 +9,27 @@ passes for a while and the refused ones agree with each other, the filter begins
 from __future__ import annotations
 
 from bisect import bisect_right
-from math import radians
+from math import log, radians
 from typing import NamedTuple
 
 import numpy as np
 
 from companion.config.target_source import FusedSource, OwnErrors
 from companion.estimation.detections import Detection
-from companion.estimation.fusion_filter import FIELDS, PER_VEHICLE, TARGET, replay
+from companion.estimation.fusion_filter import (
+    ADAPTED,
+    FIELDS,
+    GROUPS,
+    MARKS,
+    PER_VEHICLE,
+    TARGET,
+    ahead,
+    replay,
+)
 from companion.values.horizon import Array
 
 _FIRST_SIGMA_M, _FIRST_SIGMA_M_S = 100.0, 2.0
 """σ of place and velocity before the first detection."""
-_UNIT = np.eye(3)
 _CAPACITY = 512
 """Largest number of detections that are kept."""
 _WINDOW_SHARE = 2
@@ -54,8 +62,8 @@ class Fusion:
     def __init__(self, config: FusedSource, window: int) -> None:
         self._window = window
         self._noise = _noise(config)
-        self._density = config.sigma_acceleration**2
-        self._variances = self._noise[2:12:2]
+        self._accelerations = np.square([config.sigma_acceleration, config.sigma_climb])
+        self._variances = self._noise[-2 * PER_VEHICLE :: 2]
         self._slots: dict[int, int] = {}
         self._detections: list[Detection] = []
         self._pending: list[Detection] = []
@@ -66,7 +74,7 @@ class Fusion:
         self._nis = np.zeros(_CAPACITY)
         self._began: int | None = None
         self._passed: int | None = None
-        self._x0, self._P0, self._means0 = np.zeros(TARGET), np.zeros((TARGET, TARGET)), np.zeros(0)
+        self._x0, self._P0, self._memory0 = np.zeros(TARGET), np.zeros((TARGET, TARGET)), np.zeros(ADAPTED)
         self._allocate()
         self.late = self.restarts = 0
         self._forgotten_used = self._forgotten_refused = 0
@@ -112,15 +120,12 @@ class Fusion:
         count, passed = len(self._detections), self.time
         if not count or passed is None:
             return None
-        x, P = self._states[count - 1], self._covariances[count - 1]
+        x, P, memory = self._states[count - 1], self._covariances[count - 1], self._memories[count - 1]
         # Before the last detection, the state is that at it.
         elapsed = max(time - int(self._times[count - 1]), 0)
-        dt, moving = 1e-6 * elapsed, 1e-6 * min(elapsed, longest)
-        velocity = x[3:6].copy() if elapsed <= longest else np.zeros(3)
-        across = P[:3, 3:6]
-        covariance = P[:3, :3] + dt * (across + across.T) + dt * dt * P[3:6, 3:6]
-        covariance += self._density * dt**3 / 3.0 * _UNIT
-        return Belief(passed, x[:3] + moving * x[3:6], velocity, covariance)
+        state, covariance = np.empty(6), np.empty((3, 3))
+        ahead(1e-6 * elapsed, 1e-6 * min(elapsed, longest), x, P, memory, self._noise, state, covariance)
+        return Belief(passed, state[:3], state[3:], covariance)
 
     def recent(self, since: int) -> dict[int, list[float]]:
         """Return w_k of the detections of images from ``since`` (µs) on that passed, by vehicle."""
@@ -152,21 +157,32 @@ class Fusion:
         self._x0 = np.zeros(len(self._x0))
         self._x0[:3] = first.fields[:3]
         self._P0 = self._prior()
-        self._means0 = np.zeros(len(self._slots))
+        self._memory0 = self._fresh_memory()
         self._passed = None
 
     def _prior(self) -> Array:
         errors = np.tile(self._variances, len(self._slots))
         place, speed = [_FIRST_SIGMA_M**2] * 3, [_FIRST_SIGMA_M_S**2] * 3
-        return np.diag(np.concatenate([place, speed, errors]))
+        level, upward = self._accelerations
+        return np.diag(np.concatenate([place, speed, [level, level, upward], errors]))
+
+    def _fresh_memory(self) -> Array:
+        """Return the filter's memory before the first detection: the configured accelerations, no errors."""
+        level, upward = self._accelerations
+        memory = np.zeros(ADAPTED + MARKS * len(self._slots))
+        sensitivity = memory[ADAPTED - GROUPS * TARGET * TARGET : ADAPTED].reshape(GROUPS, TARGET, TARGET)
+        sensitivity[0, 6, 6] = sensitivity[0, 7, 7] = level
+        sensitivity[1, 8, 8] = upward
+        return memory
 
     def _allocate(self) -> None:
-        n, vehicles = TARGET + PER_VEHICLE * len(self._slots), len(self._slots)
+        n = TARGET + PER_VEHICLE * len(self._slots)
+        x0, P0, memory0 = self._x0, self._P0, self._memory0
+        self._x0, self._P0, self._memory0 = np.zeros(n), self._prior(), self._fresh_memory()
+        self._x0[: len(x0)], self._P0[: len(x0), : len(x0)] = x0, P0
+        self._memory0[: len(memory0)] = memory0
         self._states, self._covariances = np.zeros((_CAPACITY, n)), np.zeros((_CAPACITY, n, n))
-        self._means = np.zeros((_CAPACITY, vehicles))
-        x0, P0, means0 = self._x0, self._P0, self._means0
-        self._x0, self._P0, self._means0 = np.zeros(n), self._prior(), np.zeros(vehicles)
-        self._x0[: len(x0)], self._P0[: len(x0), : len(x0)], self._means0[: len(means0)] = x0, P0, means0
+        self._memories = np.zeros((_CAPACITY, len(self._memory0)))
 
     def _process(self) -> None:
         """Process the pending detections, and all with later images again."""
@@ -185,8 +201,8 @@ class Fusion:
         count = len(self._detections)
         replay(
             self._times, self._rows, self._data, first, count, self._began,
-            self._x0, self._P0, self._means0, self._noise,
-            self._states, self._covariances, self._means, self._used, self._nis,
+            self._x0, self._P0, self._memory0, self._noise,
+            self._states, self._covariances, self._memories, self._used, self._nis,
         )  # fmt: skip
         passed = np.flatnonzero(self._used[:count])
         if len(passed):
@@ -224,8 +240,8 @@ class Fusion:
         self._forgotten_refused += old - used
         self._began = int(self._times[old - 1])
         self._x0, self._P0 = self._states[old - 1].copy(), self._covariances[old - 1].copy()
-        self._means0 = self._means[old - 1].copy()
-        for column in (self._times, self._rows, self._data, self._states, self._covariances, self._means):
+        self._memory0 = self._memories[old - 1].copy()
+        for column in (self._times, self._rows, self._data, self._states, self._covariances, self._memories):
             column[: count - old] = column[old:count].copy()
         for flags in (self._used, self._nis):
             flags[: count - old] = flags[old:count].copy()
@@ -270,6 +286,8 @@ def _noise(config: FusedSource) -> Array:
     horizontal, vertical = errors.sigma_horizontal**2, errors.sigma_vertical**2
     position, yaw = 1.0 / errors.position_s, radians(errors.sigma_yaw_deg) ** 2
     tilt = radians(errors.sigma_tilt_deg) ** 2
+    target = [config.sigma_acceleration**2, config.sigma_climb**2, 1.0 / config.acceleration_s]
+    adaptation = [1.0 / config.adapt_s, 2.0 * log(config.adapt)]
     parts = [horizontal, position, horizontal, position, vertical, position]
     parts += [yaw, 1.0 / errors.yaw_s, tilt, 1.0 / errors.tilt_s]
-    return np.array([config.sigma_acceleration**2, config.gate, *parts, errors.sigma_white**2])
+    return np.array([config.gate, errors.sigma_white**2, *target, *adaptation, *parts])

@@ -1,9 +1,18 @@
 """Arithmetic of the fusion filter: a Kalman filter over detections in the order of their images.
 
-State (6 + 5M): position and velocity of the target (fleet-local ENU), then for each of M vehicles the errors
-of its own estimate, which all its detections have in common: position (3), yaw and elevation of the ray.
-The target's acceleration is white; each error is a first-order Gauss–Markov process. Treated as white noise,
-a bias of GNSS would be averaged away within a second, and the filter would be far too confident.
+State (9 + 5M): position, velocity and acceleration of the target (fleet-local ENU), then for each of M
+vehicles the errors of its own estimate, which all its detections have in common: position (3), yaw and
+elevation of the ray. The target's acceleration is exponentially correlated (R. A. Singer, Estimating optimal
+tracking filter performance for manned maneuvering targets, IEEE Trans. AES-6(4), 1970); each error is a
+first-order Gauss–Markov process. Treated as white noise, a bias of GNSS would be averaged away within a
+second, and the filter would be far too confident.
+
+The variance of the acceleration, one of both horizontal axes and one of the vertical, is e^θ times the
+configured one. θ has a normal prior around 0 and follows the innovations y by recursive maximum likelihood
+with exponential forgetting. With S = cov y, u = S⁻¹y and the sensitivity D = ∂P/∂θ of the target's
+covariance, the score is ½(uᵀDu − tr S⁻¹D) and its information ½ tr (S⁻¹D)². In D the target's correlation
+with the vehicles' errors is left out. θ is not negative: innovations that are smaller than S, as with cameras
+that understate their accuracy, would otherwise make the filter trust the motion far too much.
 """
 
 from __future__ import annotations
@@ -13,10 +22,10 @@ from math import exp, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.values.compiled import BOOL, INT, VOID, array, kernel, output, part
+from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, output, part
 from companion.values.horizon import Array
 
-TARGET, PER_VEHICLE = 6, 5
+TARGET, PER_VEHICLE = 9, 5
 """Number of states of the target, and of each vehicle."""
 FIELDS = 22
 """Numbers of a detection.
@@ -24,6 +33,31 @@ FIELDS = 22
 Place (3), covariance R of the camera alone (9, by rows), directions (3) into which yaw and elevation of the
 ray move the place, the camera's place (3), and the measured distance; m.
 """
+_GATE, _WHITE, _VARIANCES, _DECAY, _FORGET, _BOUND, _ERRORS = 0, 1, 2, 4, 5, 6, 7
+"""Places in ``noise``."""
+NOISE = _ERRORS + 2 * PER_VEHICLE
+"""Numbers of ``noise``.
+
+Gate; variance of a vehicle's position that is not in common (m²); variances of the target's horizontal and
+vertical acceleration (m²/s⁴); rates (1/s) at which the acceleration decays, and θ's information; bound of
+θ; variance and rate of decay (1/s) of each of the five errors of a vehicle.
+"""
+GROUPS = 2
+"""Number of variances of the acceleration."""
+_INFORMATION, _SENSITIVITY = GROUPS, 2 * GROUPS
+ADAPTED = _SENSITIVITY + GROUPS * TARGET * TARGET
+"""Numbers of ``memory`` before those of the vehicles: each θ, its information, and its D (TARGET, TARGET)."""
+MARKS = 2
+"""Numbers of ``memory`` of each vehicle: mean d², and seconds since its errors were last advanced."""
+WHITE_SHARE = 0.02
+"""Of the target's acceleration, the part that is white: a share of the spectral density at 0 Hz.
+
+With it the velocity may change at once, as that of a recorded target does.
+"""
+_PRIOR, _LEAST_INFORMATION = 1.0 / 9.0, 0.25
+"""Information of the prior of θ (σ = 3), and what is taken to be known at least, so that steps are small."""
+_SERIES = 0.05
+"""Below this time in time constants covariances are a series, because the closed form cancels."""
 _KNOWN, _LEAST_SCALE = 25.0, 0.25
 """m²: with a smaller trace of the place's covariance, the distance to the estimated place is used.
 
@@ -42,25 +76,75 @@ DEGREES_OF_FREEDOM = 3.0
 
 
 @part
-def _predict(x: Array, P: Array, dt: float, noise: Array) -> None:
-    """Advance state and covariance by ``dt`` (s)."""
+def _motion(dt: float, rate: float, F: Array, Q: Array) -> None:
+    """Write the motion of one axis in ``dt`` (s), for an acceleration of variance 1 that decays at ``rate``.
+
+    ``F`` (4,): what velocity and acceleration add to the position, the acceleration to the velocity, and what
+    is left of the acceleration. ``Q`` (6,): covariance of position, velocity and acceleration, upper triangle
+    by rows, with the white part.
+    """
+    x = rate * dt
+    e = exp(-x)
+    F[0], F[3] = dt, e
+    if x < _SERIES:
+        s = 2.0 * x
+        F[1] = dt * dt * (0.5 - x / 6.0 + x * x / 24.0)
+        F[2] = dt * (1.0 - x / 2.0 + x * x / 6.0)
+        Q[0] = s * dt**4 * (1.0 / 20.0 - x / 36.0 + x * x * 5.0 / 504.0)
+        Q[1] = s * dt**3 * (1.0 / 8.0 - x / 12.0 + x * x * 5.0 / 144.0)
+        Q[2] = s * dt**2 * (1.0 / 6.0 - x / 6.0 + x * x * 11.0 / 120.0)
+        Q[3] = s * dt**2 * (1.0 / 3.0 - x / 4.0 + x * x * 7.0 / 60.0)
+        Q[4] = s * dt * (1.0 / 2.0 - x / 2.0 + x * x * 7.0 / 24.0)
+    else:
+        F[1], F[2] = (x - 1.0 + e) / rate**2, (1.0 - e) / rate
+        Q[0] = (1.0 - e * e + 2.0 * x + 2.0 * x**3 / 3.0 - 2.0 * x * x - 4.0 * x * e) / rate**4
+        Q[1] = (1.0 + e * e - 2.0 * e + 2.0 * x * e - 2.0 * x + x * x) / rate**3
+        Q[2] = (1.0 - e * e - 2.0 * x * e) / rate**2
+        Q[3] = (4.0 * e - 3.0 - e * e + 2.0 * x) / rate**2
+        Q[4] = (1.0 + e * e - 2.0 * e) / rate
+    Q[5] = 1.0 - e * e
+    white = WHITE_SHARE * 2.0 / rate
+    Q[0] += white * dt**3 / 3.0
+    Q[1] += white * dt * dt / 2.0
+    Q[3] += white * dt
+
+
+@part
+def _advance(P: Array, F: Array) -> None:
+    """Advance a covariance that begins with the target's states, without noise."""
+    n = len(P)
+    for a in range(3):
+        for j in range(n):
+            P[a, j] += F[0] * P[3 + a, j] + F[1] * P[6 + a, j]
+            P[3 + a, j] += F[2] * P[6 + a, j]
+            P[6 + a, j] *= F[3]
+    for j in range(n):
+        for a in range(3):
+            P[j, a] += F[0] * P[j, 3 + a] + F[1] * P[j, 6 + a]
+            P[j, 3 + a] += F[2] * P[j, 6 + a]
+            P[j, 6 + a] *= F[3]
+
+
+@part
+def _disturb(P: Array, a: int, Q: Array, variance: float) -> None:
+    """Add the noise of axis ``a`` to a covariance."""
+    v, w = 3 + a, 6 + a
+    P[a, a] += variance * Q[0]
+    P[v, v] += variance * Q[3]
+    P[w, w] += variance * Q[5]
+    P[a, v] += variance * Q[1]
+    P[a, w] += variance * Q[2]
+    P[v, w] += variance * Q[4]
+    P[v, a], P[w, a], P[w, v] = P[a, v], P[a, w], P[v, w]
+
+
+@part
+def _advance_errors(x: Array, P: Array, base: int, dt: float, noise: Array) -> None:
+    """Advance the errors of one vehicle, the states from ``base`` on, by ``dt`` (s)."""
     n = len(x)
-    for a in range(3):
-        x[a] += dt * x[3 + a]
-        for j in range(n):
-            P[a, j] += dt * P[3 + a, j]
-    for a in range(3):
-        for j in range(n):
-            P[j, a] += dt * P[j, 3 + a]
-    q = noise[0] * dt
-    for a in range(3):
-        P[a, a] += q * dt * dt / 3.0
-        P[a, 3 + a] += q * dt / 2.0
-        P[3 + a, a] += q * dt / 2.0
-        P[3 + a, 3 + a] += q
-    for i in range(TARGET, n):
-        kind = (i - TARGET) % PER_VEHICLE
-        variance, rate = noise[2 + 2 * kind], noise[3 + 2 * kind]
+    for kind in range(PER_VEHICLE):
+        i = base + kind
+        variance, rate = noise[_ERRORS + 2 * kind], noise[_ERRORS + 1 + 2 * kind]
         keep = exp(-dt * rate)
         x[i] *= keep
         for j in range(n):
@@ -104,6 +188,30 @@ def _own_share(P: Array, R: Array) -> float:
     return best
 
 
+@part
+def _adapt(
+    memory: Array, D: Array, group: int, u: Array, T: Array, clip: float, keep: float, noise: Array
+) -> None:
+    """Move θ of ``group`` by what one detection says.
+
+    ``u`` (3,), its square times ``clip``; ``T`` (3, 3): S⁻¹; ``keep``: what is left of θ's information.
+    """
+    score, information = 0.0, 0.0
+    for a in range(3):
+        for b in range(3):
+            score += 0.5 * (clip * u[a] * u[b] - T[a, b]) * D[a, b]
+            for c in range(3):
+                for d in range(3):
+                    information += 0.5 * T[a, b] * D[b, c] * T[c, d] * D[d, a]
+    known = keep * memory[_INFORMATION + group] + information
+    memory[_INFORMATION + group] = known
+    theta = memory[group]
+    gain = 1.0 / (known + _LEAST_INFORMATION)
+    # What is forgotten is replaced by the prior.
+    step = gain * (score - theta * (1.0 - keep) * _PRIOR)
+    memory[group] = min(max(theta + step, 0.0), noise[_BOUND])
+
+
 @kernel(
     VOID,
     array(1, INT),
@@ -131,11 +239,11 @@ def replay(
     began: int,
     x0: Array,
     P0: Array,
-    means0: Array,
+    memory0: Array,
     noise: Array,
     X: Array,
     PP: Array,
-    means: Array,
+    memories: Array,
     used: NDArray[np.bool_],
     nis: Array,
 ) -> None:
@@ -143,27 +251,45 @@ def replay(
 
     ``times`` (N,), µs, ascending; ``slots`` (N,): index of the detecting vehicle, negative: the place is an
     estimate that may share detections with this one, combined by covariance intersection; ``data``
-    (N, FIELDS). ``x0`` (n,), ``P0`` (n, n), ``means0`` (M,): before the first detection, at ``began`` (µs).
-    ``noise`` (13,): spectral density of the acceleration, gate, variance and rate of decay (1/s) of each of
-    the five errors of a vehicle, and the variance of its position that is not in common (m²). ``X`` (N, n),
-    ``PP`` (N, n, n), ``means`` (N, M): after each detection; ``used`` (N,): whether it passed; ``nis`` (N,):
-    its d².
+    (N, FIELDS). ``x0`` (n,), ``P0`` (n, n), ``memory0`` (ADAPTED + MARKS·M,): before the first detection, at
+    ``began`` (µs). ``noise`` (NOISE,). ``X`` (N, n), ``PP`` (N, n, n), ``memories``: after each detection,
+    the errors of a vehicle as of its own last one. ``used`` (N,): whether it passed; ``nis`` (N,): its d².
     """
-    n, vehicles = len(x0), len(means0)
+    n, vehicles = len(x0), (len(memory0) - ADAPTED) // MARKS
     B, K, S, T = np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 3)), np.empty((3, 3))
-    y, place, R = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    y, u, place, R = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    F, Q, L = np.empty(4), np.empty(6), np.empty((TARGET, TARGET))
     for i in range(first, count):
         if i == 0:
-            X[i], PP[i], means[i] = x0, P0, means0
+            X[i], PP[i], memories[i] = x0, P0, memory0
             elapsed = times[i] - began
         else:
-            X[i], PP[i], means[i] = X[i - 1], PP[i - 1], means[i - 1]
+            X[i], PP[i], memories[i] = X[i - 1], PP[i - 1], memories[i - 1]
             elapsed = times[i] - times[i - 1]
-        x, P = X[i], PP[i]
+        x, P, memory = X[i], PP[i], memories[i]
+        DD = memory[_SENSITIVITY:ADAPTED].reshape((GROUPS, TARGET, TARGET))
+        dt = 1e-6 * elapsed
         if elapsed > 0:
-            _predict(x, P, 1e-6 * elapsed, noise)
+            _motion(dt, noise[_DECAY], F, Q)
+            for a in range(3):
+                x[a] += F[0] * x[3 + a] + F[1] * x[6 + a]
+                x[3 + a] += F[2] * x[6 + a]
+                x[6 + a] *= F[3]
+            _advance(P, F)
+            for group in range(GROUPS):
+                _advance(DD[group], F)
+            for a in range(3):
+                group = a // 2
+                variance = noise[_VARIANCES + group] * exp(memory[group])
+                _disturb(P, a, Q, variance)
+                _disturb(DD[group], a, Q, variance)
+            for k in range(vehicles):
+                memory[ADAPTED + MARKS * k + 1] += dt
         slot = slots[i]
-        base = TARGET + PER_VEHICLE * slot
+        base, mark = TARGET + PER_VEHICLE * slot, ADAPTED + MARKS * slot
+        if slot >= 0 and memory[mark + 1] > 0.0:
+            _advance_errors(x, P, base, memory[mark + 1], noise)
+            memory[mark + 1] = 0.0
         for a in range(3):
             for b in range(3):
                 R[a, b], place[a, b] = data[i, 3 + 3 * a + b], P[a, b]
@@ -178,7 +304,7 @@ def replay(
             for a in range(3):
                 for b in range(3):
                     R[a, b] *= scale
-                R[a, a] += noise[12]
+                R[a, a] += noise[_WHITE]
         for a in range(3):
             g, h = distance * data[i, 12 + a], distance * data[i, 15 + a]
             y[a] = data[i, a] - x[a]
@@ -197,20 +323,25 @@ def replay(
         _inverse(S, T)
         d2 = 0.0
         for a in range(3):
-            for b in range(3):
-                d2 += y[a] * T[a, b] * y[b]
+            u[a] = T[a, 0] * y[0] + T[a, 1] * y[1] + T[a, 2] * y[2]
+            d2 += y[a] * u[a]
         nis[i] = d2
-        passes = d2 <= noise[1]
+        passes = d2 <= noise[_GATE]
         if slot >= 0:
             others, number = 0.0, 0
             for k in range(vehicles):
-                if k != slot and means[i, k] > 0.0:
-                    others += means[i, k]
+                mean = memory[ADAPTED + MARKS * k]
+                if k != slot and mean > 0.0:
+                    others += mean
                     number += 1
-            before = means[i, slot] if means[i, slot] > 0.0 else DEGREES_OF_FREEDOM
-            means[i, slot] = before + MEMORY * (min(d2, noise[1]) - before)
-            if number > 0:
-                passes = passes and means[i, slot] <= SUSPECT * max(DEGREES_OF_FREEDOM, others / number)
+            before = memory[mark] if memory[mark] > 0.0 else DEGREES_OF_FREEDOM
+            memory[mark] = before + MEMORY * (min(d2, noise[_GATE]) - before)
+            trusted = number == 0 or memory[mark] <= SUSPECT * max(DEGREES_OF_FREEDOM, others / number)
+            passes = passes and trusted
+            if trusted and noise[_BOUND] > 0.0:
+                clip = min(1.0, noise[_GATE] / max(d2, 1e-9))
+                for group in range(GROUPS):
+                    _adapt(memory, DD[group], group, u, T, clip, exp(-dt * noise[_FORGET]), noise)
         used[i] = passes
         if not passes:
             continue
@@ -238,6 +369,37 @@ def replay(
                 left = P[j, k] - (K[j, 0] * B[k, 0] + K[j, 1] * B[k, 1] + K[j, 2] * B[k, 2])
                 P[j, k] = left
                 P[k, j] = left
+        # D is (I − KH) D (I − KH)ᵀ after it, with H that of the place.
+        for group in range(GROUPS):
+            D = DD[group]
+            for j in range(TARGET):
+                for k in range(TARGET):
+                    L[j, k] = D[j, k] - (K[j, 0] * D[0, k] + K[j, 1] * D[1, k] + K[j, 2] * D[2, k])
+            for j in range(TARGET):
+                for k in range(TARGET):
+                    D[j, k] = L[j, k] - (L[j, 0] * K[k, 0] + L[j, 1] * K[k, 1] + L[j, 2] * K[k, 2])
+
+
+@kernel(VOID, FLOAT, FLOAT, array(1), array(2), array(1), array(1), output(1), output(2))
+def ahead(
+    dt: float, moving: float, x: Array, P: Array, memory: Array, noise: Array, state: Array, covariance: Array
+) -> None:
+    """Write what is known ``dt`` s after a detection: ``state`` (6,), and ``covariance`` (3, 3) of the place.
+
+    ``x`` (n,), ``P`` (n, n), ``memory``: after it. The target moves for ``moving`` s and rests then.
+    """
+    F, Q, C = np.empty(4), np.empty(6), np.empty((TARGET, TARGET))
+    _motion(moving, noise[_DECAY], F, Q)
+    rests = moving < dt
+    for a in range(3):
+        state[a] = x[a] + F[0] * x[3 + a] + F[1] * x[6 + a]
+        state[3 + a] = 0.0 if rests else x[3 + a] + F[2] * x[6 + a]
+    C[:] = P[:TARGET, :TARGET]
+    _motion(dt, noise[_DECAY], F, Q)
+    _advance(C, F)
+    for a in range(3):
+        _disturb(C, a, Q, noise[_VARIANCES + a // 2] * exp(memory[a // 2]))
+    covariance[:] = C[:3, :3]
 
 
 def worst_sigma(P: Array) -> float:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from math import atan2, hypot, radians
 
 import numpy as np
+from scipy.linalg import expm
 
 from companion.config.target_source import FusedSource, OwnErrors
 from companion.estimation.detections import Detection, detection
+from companion.estimation.fusion_filter import WHITE_SHARE
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CameraTrackingGeo, Source
 from outrider.scenarios.companion_settings import own_errors
@@ -42,7 +44,7 @@ def message(system: int, place, camera, along: float | None = None) -> CameraTra
         vertical_accuracy=hypot(along * sin, across * cos),
         distance=distance,
         heading=atan2(ray[0], ray[1]),
-        heading_accuracy=radians(ACROSS_DEG),
+        heading_accuracy=across / level,
     )
 
 
@@ -104,14 +106,25 @@ class Vehicle:
 
 
 class Walker:
-    """Target with white acceleration of a spectral density ``sigma``²."""
+    """Target with the motion that the filter assumes: each axis an exponentially correlated acceleration."""
 
-    def __init__(self, random: np.random.Generator, sigma: float) -> None:
-        self._random, self._sigma = random, sigma
+    def __init__(self, random: np.random.Generator, source: FusedSource) -> None:
+        self._random, self._rate = random, 1.0 / source.acceleration_s
+        self._sigmas = np.array([source.sigma_acceleration] * 2 + [source.sigma_climb])
         self.place, self.velocity = np.zeros(3), random.normal(size=3)
+        self._acceleration = self._sigmas * random.normal(size=3)
 
     def step(self, dt: float) -> None:
-        Q = self._sigma**2 * np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
-        noise = np.linalg.cholesky(Q) @ self._random.normal(size=(2, 3))
-        self.place = self.place + dt * self.velocity + noise[0]
-        self.velocity = self.velocity + noise[1]
+        F, Q = singer(dt, self._rate)
+        before = np.stack([self.place, self.velocity, self._acceleration])
+        noise = np.linalg.cholesky(Q) @ self._random.normal(size=(3, 3)) * self._sigmas
+        self.place, self.velocity, self._acceleration = F @ before + noise
+
+
+def singer(dt: float, rate: float):
+    """Transition and covariance (3, 3) of position, velocity and acceleration of variance 1, by Van Loan."""
+    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -rate]])
+    white, driven = WHITE_SHARE * 2.0 / rate, 2.0 * rate
+    both = expm(dt * np.block([[-A, np.diag([0.0, white, driven])], [np.zeros((3, 3)), A.T]]))
+    F = both[3:, 3:].T
+    return F, F @ both[:3, 3:]

@@ -9,8 +9,11 @@ from companion.config.target_source import FusedSource, OwnErrors
 from outrider.scenarios.scenario import Scenario
 from sitl.estimation.profiles import PROFILES, SensorProfile
 
-_MESSAGE_ERROR_M = 0.02
-"""Error (m) of a detection by what messages leave of place (degE7: 1.1 cm) and time (1 ms)."""
+_MESSAGE_ERROR_M = 0.01
+"""σ (m) of a detection by what messages leave of place and time.
+
+Place: σ 0.3 cm of a step of 1.1 cm (degE7), twice; time: some ms between the clocks, at walking speed.
+"""
 
 
 def settings_of(scenario: Scenario) -> CompanionConfig:
