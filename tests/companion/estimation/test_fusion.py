@@ -51,21 +51,22 @@ def at(fusion: Fusion, time: int):
     return known
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", ["truth", "rtk", "gnss"])
 def test_errors_are_as_large_as_the_covariance_says(profile):
     """NEES of the position over flights with other errors, and NIS, within the 95 % bands of χ².
 
     The acceleration's σ is known and not adapted: with an estimated one the bands hold approximately only.
     """
-    count, nees, nis = 60, [], []
-    for seed in range(200, 200 + count):
+    count, nees, nis = 150, [], []
+    for seed in range(count):
         source, found, walker = flight(profile, seed, 4.0)
         fusion = fused(source.model_copy(update={"gate": 1e3, "adapt": 1.0}), found)
         known = at(fusion, found[-1].time)
         off = known.position - walker.place
         nees.append(float(off @ np.linalg.solve(known.covariance, off)))
-        # The first ones say where it is; the kept ones are a window.
-        nis.append(fusion.innovations[-15:])
+        # The first ones say where it is.
+        nis.append(fusion.innovations[9:])
     low, high = chi2.ppf([0.025, 0.975], 3 * count) / count
     assert low < np.mean(nees) < high
     numbers = np.concatenate(nis)
@@ -96,8 +97,9 @@ def test_the_order_of_arrival_does_not_matter(seed):
         if k % 7 == 0:
             second.at(one.time, WINDOW)
     a, b = at(first, found[-1].time), at(second, found[-1].time)
-    # Vehicles are numbered as they are first seen.
-    np.testing.assert_allclose(a.position, b.position, atol=1e-6)
+    # Vehicles are numbered as they are first seen, so sums are rounded otherwise: beside the variance of the
+    # first place, (100 m)², 1e-12 of it is (1e-4 m)².
+    np.testing.assert_allclose(a.position, b.position, atol=1e-5)
     np.testing.assert_allclose(a.covariance, b.covariance, atol=1e-6)
     assert first.used == second.used
 
