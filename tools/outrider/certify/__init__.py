@@ -2,5 +2,6 @@
 
 The steps are directory → ``reading`` → ``evidence`` → ``histories`` (each vehicle's plans) → ``lists`` (of
 agreements, from each vehicle's log) → ``agreed_planes`` (plans against agreements) and ``pairs`` (plans
-against plans) → ``verdict``. The package uses no code that makes plans or agreements.
+against plans), ``fixed_obstacles`` (plans against ``solids``) → ``verdict``. The package uses no code that
+makes plans or agreements.
 """

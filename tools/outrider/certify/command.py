@@ -33,6 +33,19 @@ def certify(directory: Path, as_json: bool = False) -> int:
     return 0 if verdict.certified else 1
 
 
+def _fixed(verdict: Verdict) -> dict[str, object]:
+    """Return the rows about fixed obstacles; none where no plan was near one."""
+    fixed, nearest = verdict.fixed, verdict.fixed.nearest
+    if nearest is None:
+        return {}
+    who = f"{nearest.system} at {verdict.seconds(nearest.time):g} s from {nearest.obstacle}"
+    return {
+        "plans checked against fixed obstacles near them": fixed.checked,
+        "least distance from a fixed obstacle, m": f"{nearest.distance:.4f}, {who}",
+        "required from fixed obstacles, m": f"{verdict.surface:.4f}",
+    }
+
+
 def show(name: str, verdict: Verdict) -> None:
     """Print the verdict as a table, then up to 20 findings and up to 20 anchors, one per line."""
     pairs, nearest = verdict.pairs, verdict.pairs.nearest
@@ -54,6 +67,7 @@ def show(name: str, verdict: Verdict) -> None:
         "required, m": f"{verdict.required:.4f}",
         "agreements": verdict.agreements,
         "plans checked against their planes": verdict.kept,
+        **_fixed(verdict),
         "plans made": verdict.plans,
         "plans carried on": len(verdict.steps(Kind.CARRIED_ON)),
         "anchors": len(anchors),

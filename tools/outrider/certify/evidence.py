@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from companion.avoidance.certified.fingerprint import FleetIdentity
+from companion.config.obstacles import Obstacle
 from mavlink_bridge.wire.agreements import Statement
 from mavlink_bridge.wire.plan import Integers, WirePlan
 
@@ -17,7 +20,8 @@ class Terms(NamedTuple):
     (µs); ``steps``: number of knots of a plan; ``fleet_identity``: fingerprints in plans and statements;
     ``required``: least distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²);
     ``upright``: whether only horizontal distances count; ``further``: what each column adds to the least
-    distance (m); ``downwash``: number by which differences in height are divided.
+    distance (m); ``downwash``: number by which differences in height are divided; ``surface``: least distance
+    (m) of a plan from the surface of a fixed obstacle.
     """
 
     fleet: tuple[int, ...]
@@ -31,6 +35,7 @@ class Terms(NamedTuple):
     upright: bool
     further: float = 0.0
     downwash: float = 1.0
+    surface: float = 0.0
 
 
 class LoggedPlan(NamedTuple):
@@ -108,10 +113,11 @@ class Log(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """Terms and logs of a run."""
+    """Terms and logs of a run, and the fixed ``obstacles`` with which each vehicle is configured, by id."""
 
     terms: Terms
     logs: tuple[Log, ...]
+    obstacles: Mapping[int, tuple[Obstacle, ...]] = MappingProxyType({})
 
 
 class Finding(NamedTuple):

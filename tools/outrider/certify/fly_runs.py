@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import between, further
+from companion.avoidance.certified.margins import between, further, margin
+from companion.config.obstacles import Obstacle
 from outrider.certify.evidence import Terms
 from outrider.errors import Fault, InputError
 from outrider.runs import names
@@ -53,6 +54,25 @@ def logs_of(runs: Iterable[FlyRun]) -> dict[int, list[Path]]:
     return found
 
 
+def obstacles_of(runs: Iterable[FlyRun]) -> dict[int, tuple[Obstacle, ...]]:
+    """Return the fixed obstacles that each vehicle knows, by system id.
+
+    Raises InputError if they differ between two runs of one vehicle, whose logs count as one.
+    """
+    found: dict[int, FlyRun] = {}
+    for run in runs:
+        first = found.setdefault(run.config.system, run)
+        if first.config.companion.obstacles != run.config.companion.obstacles:
+            raise InputError(
+                Fault(
+                    str(run.directory / CONFIGURATION),
+                    f"companion.obstacles of vehicle {run.config.system} differ from those in "
+                    f"{first.directory}; allowed: the same in all runs of a vehicle",
+                )
+            )
+    return {system: run.config.companion.obstacles for system, run in found.items()}
+
+
 def is_of_backup(log: Path) -> bool:
     """Return whether ``log`` is that of a backup node."""
     return log.parent.name.startswith(names.BACKUP_LOGS.format(""))
@@ -90,4 +110,5 @@ def _terms(config: FlyConfig) -> Terms:
         companion.planar,
         further(certified),
         companion.field.downwash,
+        companion.field.d_min + margin(certified, companion.field, companion.limits),
     )

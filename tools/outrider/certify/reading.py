@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from heapq import merge
 from operator import itemgetter
 from pathlib import Path
@@ -10,7 +10,8 @@ from pathlib import Path
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import between, further
+from companion.avoidance.certified.margins import between, further, margin
+from companion.config.obstacles import Obstacle
 from companion.values.components import COMPONENT
 from mavlink_bridge.errors import LogError, PlanWireError
 from mavlink_bridge.frames import FleetFrame
@@ -33,7 +34,7 @@ from outrider.certify.evidence import (
     Terms,
     UnreadablePayloads,
 )
-from outrider.certify.fly_runs import fly_runs, is_of_backup, logs_of, terms_of_runs
+from outrider.certify.fly_runs import fly_runs, is_of_backup, logs_of, obstacles_of, terms_of_runs
 from outrider.errors import Fault, InputError
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION, resolved
@@ -66,7 +67,7 @@ def read(directory: Path, watch: Watch) -> Evidence:
     """
     runs = fly_runs(directory) if directory.is_dir() else []
     if runs:
-        return _evidence(directory, terms_of_runs(runs), logs_of(runs), watch)
+        return _evidence(directory, terms_of_runs(runs), logs_of(runs), obstacles_of(runs), watch)
     path = directory / CONFIGURATION
     scenario = resolved(directory, _ALLOWED).scenario
     if scenario.companion.avoidance != "certified":
@@ -74,11 +75,19 @@ def read(directory: Path, watch: Watch) -> Evidence:
         raise InputError(Fault(str(path), f"flown with scenario.companion.avoidance {flown!r}; {_ALLOWED}"))
     found = {system: [directory / names.log(system)] for system in scenario.systems}
     present = {system: logs for system, logs in found.items() if logs[0].is_file()}
-    return _evidence(directory, terms_of(scenario), present, watch)
+    terms = terms_of(scenario)
+    known = dict.fromkeys(terms.fleet, settings_of(scenario).obstacles)
+    return _evidence(directory, terms, present, known, watch)
 
 
-def _evidence(directory: Path, terms: Terms, found: dict[int, list[Path]], watch: Watch) -> Evidence:
-    """Read the logs ``found`` of each vehicle, by system id."""
+def _evidence(
+    directory: Path,
+    terms: Terms,
+    found: dict[int, list[Path]],
+    obstacles: Mapping[int, tuple[Obstacle, ...]],
+    watch: Watch,
+) -> Evidence:
+    """Read the logs ``found`` of each vehicle, by system id, as are the ``obstacles`` that it knows."""
     size = sum(log.stat().st_size for logs in found.values() for log in logs)
     if not size:
         raise InputError(Fault(str(directory), f"holds no log vehicle-N.tlog; {_ALLOWED}"))
@@ -97,7 +106,7 @@ def _evidence(directory: Path, terms: Terms, found: dict[int, list[Path]], watch
         count = sum(map(len, found.values()))
         wrong = faults[0] if faults and not logs else f"{directory}: its {count} logs hold no plan"
         raise InputError(f"{wrong}; {_ALLOWED}")
-    return Evidence(terms, tuple(logs))
+    return Evidence(terms, tuple(logs), obstacles)
 
 
 def terms_of(scenario: Scenario) -> Terms:
@@ -117,6 +126,7 @@ def terms_of(scenario: Scenario) -> Terms:
         config.planar,
         further(certified),
         config.field.downwash,
+        config.field.d_min + margin(certified, config.field, limits),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from outrider.certify import agreed_planes
+from outrider.certify import agreed_planes, fixed_obstacles
 from outrider.certify.evidence import Evidence, Finding, Log, Terms
 from outrider.certify.heights import heights
 from outrider.certify.histories import History, Kind, history
@@ -16,16 +16,19 @@ class Verdict(NamedTuple):
     """Verdict on a run; without ``findings``, which are in the order of time, the run is certified.
 
     ``agreements``: number of them, each counted once for the two vehicles that list it. ``kept``: number of
-    pairs of a plan and an agreement that was checked. ``began``: the first epoch (µs), from which seconds are
-    counted. ``outside``: how often the vehicles left their tubes, by their own statements, and by how much at
-    most (m); the guarantee is suspended in that time.
+    pairs of a plan and an agreement that was checked. ``fixed``: the check against fixed obstacles;
+    ``surface``: the least distance (m) from their surfaces. ``began``: the first epoch (µs), from which
+    seconds are counted. ``outside``: how often the vehicles left their tubes, by their own statements, and by
+    how much at most (m); the guarantee is suspended in that time.
     """
 
     histories: tuple[History, ...]
     pairs: Pairs
     agreements: int
     kept: int
+    fixed: fixed_obstacles.Kept
     required: float
+    surface: float
     damaged: int
     began: int
     outside: tuple[int, float]
@@ -60,9 +63,9 @@ class Verdict(NamedTuple):
         """Return the verdict as JSON values.
 
         ``plans``: number of those that were not carried on, anchors among them; ``unchecked``: pairs left
-        out, by reason.
+        out, by reason. ``obstacles_checked``: number of pairs of a plan and a fixed obstacle near it.
         """
-        pairs, nearest = self.pairs, self.pairs.nearest
+        pairs, nearest, obstacle = self.pairs, self.pairs.nearest, self.fixed.nearest
         return {
             "certified": self.certified,
             "vehicles": len(self.histories),
@@ -75,6 +78,11 @@ class Verdict(NamedTuple):
             "required_m": self.required,
             "agreements": self.agreements,
             "planes_checked": self.kept,
+            "obstacles_checked": self.fixed.checked,
+            "least_to_obstacle_m": None if obstacle is None else obstacle.distance,
+            "least_to_obstacle_s": None if obstacle is None else self.seconds(obstacle.time),
+            "least_to_obstacle": None if obstacle is None else [obstacle.system, obstacle.obstacle],
+            "required_to_obstacle_m": self.surface,
             "plans": self.plans,
             "carried_on": len(self.steps(Kind.CARRIED_ON)),
             "anchors": len(self.steps(Kind.ANCHOR)),
@@ -91,17 +99,19 @@ class Verdict(NamedTuple):
 
 def judge(evidence: Evidence) -> Verdict:
     """Return the verdict on a run."""
-    terms, logs = evidence
+    terms, logs, obstacles = evidence
     histories, findings = [], _strange(terms, logs)
     for system in terms.fleet:
         found, wrong = history(system, terms, logs)
         histories.append(found)
         findings += wrong
-    pairs = check(histories, terms, heights(histories, logs))
+    spans = heights(histories, logs)
+    pairs = check(histories, terms, spans)
     began = min(pairs.epochs, default=0)
     listed, wrong = _listed(histories, terms, logs)
     kept = agreed_planes.check(histories, listed, terms)
-    findings += [*pairs.findings, *wrong, *kept.findings, *_absent(histories, logs, began)]
+    fixed = fixed_obstacles.check(histories, obstacles, terms, logs, spans)
+    findings += [*pairs.findings, *wrong, *kept.findings, *fixed.findings, *_absent(histories, logs, began)]
     findings.sort(key=lambda finding: (finding.time, finding.who, finding.what, finding.figures))
     damaged = sum(log.damaged for log in logs)
     agreements = {frozenset(((one.owner, one.agreement[0]), (one.peer, one.agreement[1]))) for one in listed}
@@ -110,7 +120,9 @@ def judge(evidence: Evidence) -> Verdict:
         pairs,
         len(agreements),
         kept.checked,
+        fixed,
         terms.required,
+        terms.surface,
         damaged,
         began,
         _outside(logs),

@@ -85,13 +85,13 @@ def _near_obstacle(what: str, points: Array, scenario: Scenario, fixed: FixedObs
             at = ", ".join(f"{value:g}" for value in np.round(points[0], 2))
             where = "inside" if apart < 0.0 else f"{apart:.2f} m from"
             yield (
-                f"{what} at [{at}] {where} obstacles[{index}], {_described(one)};"
+                f"{what} at [{at}] {where} obstacles[{index}], {described(one)};"
                 f" allowed: at least d_min_obstacle = {least:g} m from it"
             )
             return
 
 
-def _described(obstacle: Obstacle) -> str:
+def described(obstacle: Obstacle) -> str:
     """Return the kind of an obstacle, and where it is."""
     if isinstance(obstacle, Wall):
         return "a wall from [{:g}, {:g}] to [{:g}, {:g}]".format(*obstacle.ends[0], *obstacle.ends[1])
