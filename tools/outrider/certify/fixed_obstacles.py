@@ -91,6 +91,10 @@ def check(
             if step.plan.column and within(decides, epoch, epoch + terms.epoch):
                 continue
             space = before is not None and before.plan.column and not step.plan.column
+            if before is not None and step.kind is Kind.MADE:
+                # It is made beside what was left of the plan before.
+                left = carried_on(before.plan, (epoch - before.plan.epoch) // terms.dt)
+                vehicle.see(left, begins=False, made=False)
             anew = step.kind in (Kind.FIRST, Kind.ANCHOR) or space
             vehicle.see(step.plan, begins=anew, made=step.kind is not Kind.CARRIED_ON)
         orders = by_owner[history.system].orders if history.system in by_owner else ()

@@ -45,7 +45,9 @@ def replay(
     certify: Annotated[
         bool,
         typer.Option(
-            "--certify", help="Check from the transmitted plans that all vehicles kept their distance."
+            "--certify",
+            help="Check from the transmitted plans that all vehicles kept their distance from each other and "
+            "from fixed obstacles.",
         ),
     ] = False,
     own: Annotated[int | None, typer.Option(min=1, max=255, help="The own vehicle's system id.")] = None,
