@@ -153,7 +153,8 @@ def _parse(text: str) -> Endpoint:
         return _serial(text)
     scheme, colon, rest = text.partition(":")
     if not colon or scheme not in _PARSERS:
-        raise _FormError(f"no endpoint begins with {scheme[:20]!r}; allowed are {_FORMS}")
+        meant = f"; did you mean 'tlog:{text}'?" if text.endswith((".tlog", ".tlog.gz")) else ""
+        raise _FormError(f"no endpoint begins with {scheme[:20]!r}; allowed are {_FORMS}{meant}")
     return _PARSERS[scheme](rest)
 
 

@@ -37,3 +37,16 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert target.exists(), f"{page.name}: {link}"
         if anchor and target.suffix == ".md":
             assert anchor in anchors(target), f"{page.name}: {link}"
+
+
+def test_every_picture_is_shown_by_a_page() -> None:
+    shown = {
+        (page.parent / link).resolve()
+        for page in PAGES
+        for link in _LINK.findall(page.read_text(encoding="utf-8"))
+    }
+    pictures = {
+        path for folder in ("pictures", "gallery") for path in (ROOT / "docs" / folder).glob("*.[pgjs]*")
+    }
+    assert len(pictures) > 10
+    assert pictures <= shown

@@ -55,6 +55,39 @@ def test_an_unknown_scenario(refused: Callable[..., list[str]]) -> None:
     assert "did you mean 'antipodal-8'?" in line
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("swarm", "escort", "--loss", "20"), "outrider swarm: --loss 20: allowed: a number ≥ 0 and ≤ 1"),
+        (("swarm", "escort", "--loss", "much"), "outrider swarm: --loss much: allowed: a number ≥ 0 and ≤ 1"),
+        (("swarm", "escort", "--seed", "-1"), "outrider swarm: --seed -1: allowed: a whole number ≥ 0"),
+        (
+            ("swarm", "escort", "--vehicles", "five"),
+            "outrider swarm: --vehicles five: allowed: a whole number",
+        ),
+        (
+            ("export", "runs/mine"),
+            "outrider export: Missing option '--format': mcap, csv, parquet or ulog",
+        ),
+        (
+            ("swarm",),
+            "outrider swarm: Missing argument 'scenario': A file, or the name of a shipped scenario",
+        ),
+    ],
+)
+def test_a_wrong_number_or_a_missing_option_says_what_is_allowed(
+    arguments: tuple[str, ...], said: str, refused: Callable[..., list[str]]
+) -> None:
+    (line,) = refused(*arguments)
+    assert line.startswith(f"{said}; see outrider ")
+
+
+def test_a_log_that_is_not_there_says_what_can_be_replayed(refused: Callable[..., list[str]]) -> None:
+    assert refused("replay", "runs/none") == [
+        "runs/none: no such file or directory; allowed: a .tlog, a .tlog.gz, or the directory of a run"
+    ]
+
+
 @pytest.mark.parametrize("name", ["nowhere.yaml", "nowhere/scenario.yaml", "a folder/x.yml"])
 def test_a_missing_file(name: str, refused: Callable[..., list[str]], tmp_path: Path) -> None:
     (tmp_path / "a folder").mkdir()

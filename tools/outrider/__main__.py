@@ -15,6 +15,7 @@ from outrider.commands.finding import listing, new
 from outrider.commands.flying import doctor, fly, preflight, sitl, swarm
 from outrider.commands.machine import bench, key
 from outrider.commands.reading import export, replay, report, view
+from outrider.commands.usage import usage_words
 from outrider.errors import InputError, OutriderError
 
 _HELP: Final = {"help_option_names": ["-h", "--help"]}
@@ -22,7 +23,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings=_HELP,
-    help="A ring of MAVs escorts a moving target without colliding.",
+    help="A ring of drones escorts a moving target without colliding.",
 )
 BAD_INPUT, FAULT = 2, 3
 _INTERRUPTED = 130
@@ -102,10 +103,9 @@ def main() -> None:
         sys.stderr.write(f"{error}\n")
         sys.exit(BAD_INPUT)
     except _UsageError as error:
-        said = error.format_message()
-        if said:
+        if said := usage_words(error):
             command = "outrider" if error.ctx is None else error.ctx.command_path
-            line = f"{command}: {said.rstrip('.')}; see {command} --help"
+            line = f"{command}: {said}; see {command} --help"
             sys.stderr.write(f"{InputError(line)}\n")
         sys.exit(BAD_INPUT)
     except (typer.Abort, KeyboardInterrupt):

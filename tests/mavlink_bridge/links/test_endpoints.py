@@ -57,6 +57,7 @@ def test_the_forms(text: str, endpoint: Endpoint) -> None:
     [
         ("", "allowed are udpin:HOST:PORT"),
         ("udp:127.0.0.1:14550", "no endpoint begins with 'udp'"),
+        ("logs/a.tlog", "did you mean 'tlog:logs/a.tlog'"),
         ("14550", "allowed are"),
         ("COM3,57600", "allowed are"),
         ("udpin:127.0.0.1", "the port is missing"),

@@ -74,6 +74,7 @@ CONTRADICTIONS: list[tuple[str, dict[str, Any], str]] = [
         "needs a target of kind 'fixed'",
     ),
     ("escort", {"target": {"system": 12}}, "id of a vehicle"),
+    ("escort", {"companion": {"task": "goto"}}, "task 'escort' needs companion.task: escort; it is 'goto'"),
     ("escort", {"companion": {"target_d_safe": None}}, "come together"),
     ("escort", {"companion": {"limits": {"a_total": 1.0}}}, "a_total"),
     ("scenario-1", {"vehicles": 0}, "greater than or equal to 1"),

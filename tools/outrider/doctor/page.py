@@ -25,7 +25,7 @@ def show(name: str, verdict: Verdict) -> None:
     """
     console = Console(highlight=False)
     reported = [(severity, len(verdict.of(severity))) for severity in reversed(Severity)]
-    counts = ", ".join(f"{count} {severity.value}" for severity, count in reported if count)
+    counts = ", ".join(f"{count} {_plural(severity, count)}" for severity, count in reported if count)
     ready = "ready for an escort" if verdict.ready else "NOT ready for an escort"
     # Not wrapped: the length of the name must not move line breaks within text that scripts search for.
     console.print(Text(f"{name}: {ready} ({counts})", style="bold"), soft_wrap=True)
@@ -53,3 +53,8 @@ def document(verdict: Verdict) -> dict[str, Any]:
 def _plain(text: str) -> str:
     """Replace unprintable characters: texts of vehicles could otherwise control the terminal."""
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def _plural(severity: Severity, count: int) -> str:
+    countable = severity in (Severity.WARNING, Severity.NOTE) and count > 1
+    return severity.value + "s" * countable

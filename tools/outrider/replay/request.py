@@ -20,6 +20,7 @@ from outrider.replay.telemetry import Forwarder, paced
 from outrider.shadow.roles import Roles
 from outrider.terminal.share_progress import share_progress
 
+_ALLOWED_LOGS = "allowed: a .tlog, a .tlog.gz, or the directory of a run"
 _ALLOWED_ACTIONS = "allowed: --list, --own ID, --target ID, --to ENDPOINT, or the directory of a run"
 
 
@@ -52,7 +53,7 @@ class Request(NamedTuple):
         if self.own is None:
             if self.to is None:
                 if not self.log.exists():
-                    raise InputError(f"{self.log}: no such file or directory; {_ALLOWED_ACTIONS}")
+                    raise InputError(f"{self.log}: no such file or directory; {_ALLOWED_LOGS}")
                 raise InputError(f"replay {self.log}: no action is given; {_ALLOWED_ACTIONS}")
             self._only("--to without --own", ("neighbours", "out"))
             return self._send()

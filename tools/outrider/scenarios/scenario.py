@@ -128,7 +128,11 @@ class Scenario(Part):
         (), max_length=244, description="other cameras of single vehicles"
     )
     weather: WeatherConfig = WeatherConfig()
-    d_min: Length = Field(0.5, description="m between centres of vehicles; below it is a violation")
+    d_min: Length = Field(
+        0.5,
+        description="m between centres of vehicles; below it is a violation. It only judges the flight: the"
+        " planners keep companion.field.d_min, so change both",
+    )
     d_min_target: Length | None = Field(None, description="m to the target; null: the target is no obstacle")
     d_min_obstacle: Length = Field(0.5, description="m from a vehicle's centre to an obstacle's surface")
     cap_s: float = Field(60.0, gt=0.0, le=3600.0, description="simulated seconds after the goal event")
@@ -235,6 +239,8 @@ class Scenario(Part):
                 yield f"task {self.task!r} needs a target of kind 'fixed': what the vehicles face"
             if self.companion.task != "goto":
                 yield f"task {self.task!r} needs companion.task: goto; it is {self.companion.task!r}"
+        elif self.companion.task != "escort":
+            yield f"task 'escort' needs companion.task: escort; it is {self.companion.task!r}"
 
     def _weather_faults(self) -> Iterator[str]:
         if self.physics == "own" and (setting := self.weather.needs_jsbsim):
