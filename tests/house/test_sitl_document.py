@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from typer.main import get_command
 
 from mavlink_bridge.messages import CommandAck, CommandLong, Source, StatusText
 from outrider.__main__ import app
+from tests.clients.sitl_process import Sitl
 from tests.sitl.autopilot_rig import FLAVOURS, Rig
 
 TEXT = (Path(__file__).parents[2] / "docs" / "sitl.md").read_text(encoding="utf-8")
@@ -40,3 +43,16 @@ def test_what_is_said_not_to_be_flown_is_refused_with_a_reason(flavour: str) -> 
         assert rig.all(StatusText)[-1].text
         assert rig.autopilot.mode is before
     assert len(rig.all(StatusText)) >= len(calls)
+
+
+@pytest.mark.slow
+def test_its_program_arms_takes_off_and_flies_there() -> None:
+    (program,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+    assert program.count("tcp:127.0.0.1:5760") == 1
+    with Sitl("ardupilot", 1) as sitl:
+        text = program.replace("tcp:127.0.0.1:5760", sitl.endpoint(0))
+        client = subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True)
+        sitl.start()
+        said, _ = client.communicate(timeout=120.0)
+    lines = [line for line in said.splitlines() if not line.startswith("[Errno")]
+    assert lines == ["armed: 0", "take-off: 0", "there"]
