@@ -16,6 +16,7 @@ from companion.estimation.tracks import State
 from companion.estimation.turn_rate import Path
 from companion.goals.formation import even_turn, outside, spacing, taking_part
 from companion.goals.perception import PerceptionFormation
+from companion.goals.roofs import Roofs
 from companion.goals.settling import Settling
 from companion.values.bearings import turned
 from companion.values.horizon import Array, Motion
@@ -98,7 +99,8 @@ class Goals:
             if isinstance(formation, Perception)
             else None
         )
-        self._settling = Settling(config, self._unshared)
+        self._roofs = Roofs(config.obstacles)
+        self._settling = Settling(config, self._unshared, self._roofs)
         self._phase: Phase | None = None
         self._held: Array | None = None
         self._began: Array | None = None
@@ -133,7 +135,8 @@ class Goals:
         if phase is not self._phase:
             self._phase, self._held = phase, None
             limits = self._pilot.planned_limits
-            self._settling = Settling(self._config.model_copy(update={"limits": limits}), self._unshared)
+            config = self._config.model_copy(update={"limits": limits})
+            self._settling = Settling(config, self._unshared, self._roofs)
             self._nearest = inf
         elif phase is Phase.ESCORT and self._config.task == "escort" and view.target is not None:
             self._held = None

@@ -8,6 +8,7 @@ import numpy as np
 
 from companion.avoidance.certified.margins import between, further, margin
 from companion.config import CompanionConfig
+from companion.goals.roofs import Roofs
 from companion.obstacles.static import FIRST_ID
 from companion.values.horizon import Array, Motion
 from companion.values.obstacles import Obstacles
@@ -28,10 +29,14 @@ class Settling:
     ``guard.landing_clearance`` of a surface. With committed plans it is also within the distance of two
     columns from a vehicle, and within what a column keeps from the surface of anything that flies no
     committed plan: posts, what is sensed, and the systems of ``unshared`` (the target, moving obstacles).
+    ``roofs``: the fixed obstacles; those of ``config`` if None.
     """
 
-    def __init__(self, config: CompanionConfig, unshared: Collection[int] = ()) -> None:
+    def __init__(
+        self, config: CompanionConfig, unshared: Collection[int] = (), roofs: Roofs | None = None
+    ) -> None:
         self._config, self._unshared = config, unshared
+        self._roofs = Roofs(config.obstacles) if roofs is None else roofs
         self._from_vehicles = self._from_others = config.guard.landing_clearance
         if config.avoidance == "certified":
             self._from_vehicles = max(self._from_vehicles, between_columns(config))
@@ -44,8 +49,8 @@ class Settling:
         """Return the place (3,), m, to go to at ``now`` (µs).
 
         It is where braking from the first call on ends, clipped to the box; or a place beside a near
-        obstacle, which may be a landed vehicle that stays there. The vehicle first waits for up to 5 s for an
-        obstacle that passes.
+        obstacle, which may be a landed vehicle that stays there. From above or below a box it is the nearest
+        side's that has room, if one has. The vehicle first waits for up to 5 s for an obstacle that passes.
         """
         config, here = self._config, measured.position
         speed = float(np.linalg.norm(measured.velocity))
@@ -62,7 +67,9 @@ class Settling:
             elif not self._waits(now, obstacles.positions[nearest]):
                 radius = float(np.broadcast_to(obstacles.radius, len(obstacles.ids))[nearest])
                 distance = radius + clearances[nearest] + _EXTRA_CLEARANCE_M
-                self._rest = self._beside(here, obstacles.positions[nearest, 0], distance)
+                out = self._out(here, obstacles.ids[nearest], distance)
+                beside = self._beside(here, obstacles.positions[nearest, 0], distance)
+                self._rest = beside if out is None else out
         return self._rest
 
     def _clearances(self, obstacles: Obstacles) -> Array:
@@ -84,6 +91,16 @@ class Settling:
             return False
         self._waiting_since = now if self._waiting_since is None else self._waiting_since
         return now - self._waiting_since < _MAX_WAIT_US
+
+    def _out(self, here: Array, id_: int, distance: float) -> Array | None:
+        """Return the place (3,), m, at the present height, ``distance`` (m) out of the box below or above.
+
+        None if the obstacle is no such box, or if its four sides have no room.
+        """
+        limits, clear = self._config.limits, distance - 0.5 * _EXTRA_CLEARANCE_M
+        low, high = np.array(limits.box_min)[:2], np.array(limits.box_max)[:2]
+        place = self._roofs.way_out(id_ - FIRST_ID, here[:2], distance, clear, low, high)
+        return None if place is None else np.append(place, here[2])
 
     def _beside(self, here: Array, centre: Array, distance: float) -> Array:
         """Return a place (3,), m, at the present height, at a ``distance`` (m) from ``centre`` (3,)."""
