@@ -101,6 +101,18 @@ def test_a_start_and_a_goal_beside_obstacles_can_work_and_in_the_air_also_above_
     assert not list(obstacles_to(above, FIREFLY.span))
 
 
+def test_above_a_post_only_the_field_can_work() -> None:
+    """The planes of committed plans keep beside a post at every height, and nothing would keep above it."""
+    post = {"kind": "post", "at": [9, 0], "radius": 1, "height": 4}
+    places = {"at": [[0, 0, 8], [9, 0, 8]], "goals": [[-5, 0, 5], [9, 5, 8]]}
+    changes = {**GOTO, "starts": {**POINTS, **places}, "obstacles": [post], "airborne": True}
+    assert not list(obstacles_to(scenario("obstacles", **changes), FIREFLY.span))
+    committed = scenario("obstacles", **changes, companion={"avoidance": "certified"})
+    found = list(obstacles_to(committed, FIREFLY.span))
+    assert len(found) == 1
+    assert "vehicle 12 starts at [9, 0, 8] above or inside obstacles[0], a post at [9, 0]" in found[0]
+
+
 def test_a_start_that_its_jitter_moves_too_near_is_refused_for_that_seed() -> None:
     """Of two seeds one draws a start beside the box, the other one that is clear of it."""
     at = {"at": [[0, 0, 5], [7.45, 0, 5]], "goals": [[0, 5, 5], [5, 5, 5]]}

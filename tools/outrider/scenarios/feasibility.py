@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
-from math import ceil, pi
+from math import ceil, inf, pi
 
 import numpy as np
 
-from companion.config.obstacles import Obstacle, Wall
+from companion.config.obstacles import Obstacle, Post, Wall
 from companion.obstacles.static import FIRST_ID, FixedObstacles
 from outrider.errors import InputError
 from outrider.scenarios.part import FIRST_SYSTEM
@@ -54,7 +54,8 @@ def obstacles_to(scenario: Scenario, span: float) -> Iterator[str]:
 def in_obstacles(starts: Array, goals: Array | None, scenario: Scenario) -> Iterator[str]:
     """Yield a sentence for each of ``starts`` (K, 3) and ``goals``, m, too near to a fixed obstacle.
 
-    The way up to a start from the ground counts with it.
+    The way up to a start from the ground counts with it. With committed plans no height above a post counts:
+    no plane would keep a vehicle that begins there above it.
     """
     if not scenario.obstacles:
         return
@@ -78,15 +79,19 @@ def check_drawn(scenario: Scenario, seed: int, starts: Array) -> None:
 def _near_obstacle(what: str, points: Array, scenario: Scenario, fixed: FixedObstacles) -> Iterator[str]:
     """Yield a sentence if one of ``points`` (n, 3) is too near to an obstacle."""
     obstacles, least = scenario.obstacles, scenario.d_min_obstacle
+    endless = scenario.companion.avoidance == "certified"
     for index in (name - FIRST_ID for name in fixed.around(points, least).ids):
         one = obstacles[index]
-        apart = float(FixedObstacles([one]).distance(points).min())
+        level = endless and isinstance(one, Post)
+        solid = one.model_copy(update={"height": inf}) if level else one
+        apart = float(FixedObstacles([solid]).distance(points).min())
         if apart < least:
             at = ", ".join(f"{value:g}" for value in np.round(points[0], 2))
-            where = "inside" if apart < 0.0 else f"{apart:.2f} m from"
+            inside, beside = ("above or inside", " horizontally") if level else ("inside", "")
+            where = inside if apart < 0.0 else f"{apart:.2f} m{beside} from"
             yield (
                 f"{what} at [{at}] {where} obstacles[{index}], {described(one)};"
-                f" allowed: at least d_min_obstacle = {least:g} m from it"
+                f" allowed: at least d_min_obstacle = {least:g} m{beside} from it"
             )
             return
 
