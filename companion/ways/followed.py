@@ -53,14 +53,19 @@ class Followed:
         If it is not seen itself, it moves back instead. Returns False if no place was seen with the
         ``clearance`` (m).
         """
-        last, at, seen, back = len(self._places) - 1, self._at, False, False
+        last, at, step = len(self._places) - 1, self._at, _STEP
+        seen = back = False
         for _ in range(_LOOKS):
             if clear.sees(place, self._places[at], clearance):
                 self._at, seen = at, True
                 off = self._places[at] - place
                 if back or at == last or float(off @ off) > _AHEAD_M**2:
                     break
-                at = min(at + _STEP, last)
+                at = min(at + step, last)
+            elif seen and step > 1:
+                # Behind a bend the furthest place seen may be less than a whole step away.
+                step //= 2
+                at = min(self._at + step, last)
             elif seen or at == 0:
                 break
             else:

@@ -9,9 +9,11 @@ import pytest
 
 from companion.config.obstacles import Box, Wall
 from companion.config.planning import LimitsConfig
+from companion.config.way import WayConfig
 from companion.obstacles.static import FixedObstacles
 from companion.ways.finding import finding
 from companion.ways.search import Search
+from companion.ways.way import Way
 from tests.companion.ways.worlds import (
     BOX,
     LEAST,
@@ -246,3 +248,21 @@ def test_among_thousands_of_boxes_each_cell_is_compared_with_those_near_it() -> 
     wanted = np.minimum(FixedObstacles(boxes).distance(some).min(axis=1), 0.8)
     assert np.allclose(clear.cells[clear.grid.nearest(some)], wanted, atol=1e-9)
     assert np.allclose(clear.at(some), wanted, atol=1e-9)
+
+
+def test_a_point_passes_bends_that_are_nearer_to_each_other_than_places_where_it_looks() -> None:
+    """A corridor of half a metre that turns six times within three metres."""
+    closed = ["#######", "......#", "#####.#", "#.....#", "#.#####", "#......", "#######"]
+    boxes = [
+        Box(kind="box", at=(0.5 * x, -0.5 * y, 1.25), size=(0.5, 0.5, 2.5))
+        for y, cells in enumerate(closed)
+        for x, cell in enumerate(cells)
+        if cell == "#"
+    ]
+    limits = LimitsConfig(box_min=(-1.0, -3.3, 0.5), box_max=(4.0, 0.3, 2.5))
+    leads = Way(WayConfig(clearance=0.0, cell=0.1), boxes, limits, 0.2, 10, planar=True)
+    start, goal = np.array([-0.6, -0.5, 1.0]), np.array([3.6, -2.5, 1.0])
+    places = flown(leads, start, goal, by=0.05)
+    assert np.abs(places[-1] - goal).max() < 1e-6
+    assert leads.begun == 1
+    assert least(boxes, places) >= 0.15
