@@ -136,6 +136,11 @@ class CertifiedConfig(Settings):
         " takes off or lands; the default is for calm air, wind needs more",
     )
     sigmas: float = Field(3.0, ge=0.0, le=6.0, description="k of k·σ of the position estimate")
+    d_min_obstacle: Positive | None = Field(
+        None,
+        description="m, least distance of a vehicle's centre from the surfaces of fixed obstacles; null:"
+        " `field.d_min`, that of two vehicles",
+    )
     clock_us: int = Field(5_000, ge=0, le=100_000, description="µs that a clock may differ from fleet time")
     fleet_time: Literal["own", "measured"] = Field(
         "own",

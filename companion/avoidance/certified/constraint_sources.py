@@ -12,7 +12,7 @@ import numpy as np
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.columns import levelled
 from companion.avoidance.certified.committed import horizon_of
-from companion.avoidance.certified.margins import beside, between, fastest, further, margin
+from companion.avoidance.certified.margins import beside, between, fastest, from_surfaces, further, margin
 from companion.avoidance.certified.noncooperative import NonCooperative
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.separating_planes import Others
@@ -49,7 +49,7 @@ class ConstraintSources:
         """Least distance (m) between two plans."""
         self._further = further(own)
         self._margin = margin(own, config.field, config.limits)
-        self._from_surfaces = config.field.d_min + self._margin
+        self._from_surfaces = from_surfaces(own, config.field, config.limits)
         """Least distance (m) of a plan from a surface."""
         self._beside = beside(own, config.field, config.limits)
         self._silent_us = config.guard.neighbour_lost_us
@@ -58,7 +58,8 @@ class ConstraintSources:
         self._balls = FixedObstacles([one for one in self._round if isinstance(one, Sphere)])
         self._boxes = BoxIndex(boxes_of(config.obstacles))
         self._noncooperative = NonCooperative(config, steps)
-        self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + self.between + _SIGHT_MARGIN_M
+        widest = max(self.between, self._from_surfaces)
+        self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + widest + _SIGHT_MARGIN_M
 
     def around(
         self, now: int, epoch: int, own: Array, agreements: Agreements, world: World, view: View
@@ -132,8 +133,7 @@ class ConstraintSources:
                 centres = place.copy()
                 if upright:
                     centres[..., 2] = own[..., 2]
-                least = self._config.field.d_min + radius + self._margin
-                found.append((centres, least))
+                found.append((centres, self._from_surfaces + radius))
         return found
 
     def _boxes_near(self, own: Array) -> Boxes | None:
@@ -209,7 +209,7 @@ class ConstraintSources:
         fixed = []
         for one in self._round:
             above = 0.0 if isinstance(one, Post) else max(one.at[2] - high, low - one.at[2], 0.0)
-            fixed.append((one.at[:2], self._config.field.d_min + one.radius + self._margin, above))
+            fixed.append((one.at[:2], self._from_surfaces + one.radius, above))
         landed = [
             (tuple(last.controls[-1, 2, :2]), self._from_last(last), 0.0) for last in agreements.left.values()
         ]

@@ -16,7 +16,7 @@ from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.detour import Detour
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import beside, further, margin
+from companion.avoidance.certified.margins import beside, from_surfaces, further
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.reservation import Reservation
@@ -57,7 +57,7 @@ class CertifiedFlight:
         self._sources = ConstraintSources(config, steps)
         self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
-        least = config.field.d_min + margin(certified, config.field, config.limits) + _BESIDE_M
+        least = from_surfaces(certified, config.field, config.limits) + _BESIDE_M
         self._way = way_of(config, least, _EFFORT)
         between = self._sources.between
         downwash = config.field.downwash

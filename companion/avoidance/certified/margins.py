@@ -34,6 +34,12 @@ def between(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -
     return field.d_min + 2.0 * margin(config, field, limits)
 
 
+def from_surfaces(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
+    """Return the least distance (m) of a plan from the surfaces of fixed obstacles."""
+    least = field.d_min if config.d_min_obstacle is None else config.d_min_obstacle
+    return least + margin(config, field, limits)
+
+
 def further(config: CertifiedConfig) -> float:
     """Return by how much further (m) than from a plan in space others keep from a column.
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from companion.config.obstacles import Box, Obstacle, Post
 from companion.obstacles.static import FixedObstacles
 from companion.values.horizon import Array
 from companion.values.phase import Phase
@@ -110,3 +111,29 @@ def test_where_there_is_no_way_the_ground_is_told_until_there_is_one() -> None:
     told(2.0)
     assert not of.companion.health.concerns
     assert off(of, (0.5, 1.0, 5.0)) < 1.0
+
+
+@pytest.mark.parametrize("least", [None, 0.3])
+@pytest.mark.parametrize("kind", ["box", "post"])
+def test_committed_plans_pass_a_gap_as_wide_as_the_least_distance_of_obstacles(
+    kind: str, least: float | None
+) -> None:
+    """1.6 m wide: too narrow for 0.5 m and a tube of 0.35 m at both sides, wide enough for 0.3 m."""
+    gap: list[Obstacle] = []
+    for side in (-1.0, 1.0):
+        if kind == "box":
+            gap.append(Box(kind="box", at=(4.0, side * 6.8, 5.0), size=(1.0, 12.0, 12.0)))
+        else:
+            gap += [Post(kind="post", at=(4.0, side * (1.3 + 0.9 * k)), radius=0.5) for k in range(13)]
+    of = bench(
+        gap,
+        avoidance="certified",
+        planar=True,
+        field={"d_min": 0.5},
+        certified={"tube": 0.35, "d_min_obstacle": least},
+        way={"clearance": 0.0, "cell": 0.1},
+    ).take_off()
+    of.go_to(BEHIND)
+    places = flown(of, 25.0, BEHIND)
+    assert (off(of, BEHIND) < 0.3) == (least is not None)
+    assert FixedObstacles(tuple(gap)).distance(places).min() > (0.5 if least is None else least)

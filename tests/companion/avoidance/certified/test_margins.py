@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.margins import between, margin, reachable
+from companion.avoidance.certified.margins import between, from_surfaces, margin, reachable
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import FieldConfig, LimitsConfig
 from companion.values.horizon import Array
@@ -100,3 +100,15 @@ def test_plans_that_far_apart_leave_d_min_whatever_is_off(
     apart = np.array([between(config, field, limits), 0.0, 0.0]) + off
     assert np.linalg.norm(apart) >= field.d_min - 1e-9
     assert between(config, field, limits) == pytest.approx(field.d_min + 2.0 * margin(config, field, limits))
+
+
+@given(st.floats(0.01, 2.0), st.floats(0.0, 1.0), st.floats(0.05, 2.0))
+def test_plans_keep_the_own_margin_and_the_least_distance_of_obstacles(
+    tube: float, sigma: float, least: float
+) -> None:
+    config, field, limits = CertifiedConfig(tube=tube), FieldConfig(position_sigma=sigma), LimitsConfig()
+    off = margin(config, field, limits)
+    assert from_surfaces(config, field, limits) == pytest.approx(field.d_min + off)
+    other = config.model_copy(update={"d_min_obstacle": least})
+    assert from_surfaces(other, field, limits) == pytest.approx(least + off)
+    assert between(other, field, limits) == between(config, field, limits)
