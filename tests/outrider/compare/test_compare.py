@@ -26,7 +26,14 @@ def flight(**changes: Any) -> dict[str, Any]:
     """Return the figures of a flight that succeeds."""
     found = dict.fromkeys(("path_m", "acceleration2", "jerk2", "stops", "most_speed"), 1.0)
     found |= dict.fromkeys(("most_acceleration", "most_jerk", "plan_ms_p50", "plan_ms_p99"), 1.0)
-    found |= {"vehicles": 2, "arrived": 2, "mean_s": 5.0, "last_s": 6.0, "separation_m": 0.5}
+    found |= {
+        "vehicles": 2,
+        "arrived": 2,
+        "mean_s": 5.0,
+        "last_s": 6.0,
+        "separation_m": 0.5,
+        "obstacle_m": None,
+    }
     return {**found, "held_epochs": 0, "solver_failures": 0, "failure": None, **changes}
 
 
@@ -75,6 +82,20 @@ def test_collisions_late_flights_and_faults_are_no_success() -> None:
     assert all(one in text for one in comparison.differences)
 
 
+def test_who_touches_an_obstacle_collided_and_the_last_arrivals_have_a_bar() -> None:
+    comparison = load(find("comparisons", "lsc-forest"), Comparison)
+    row = comparison.rows[0]
+    flights = entries(flight(obstacle_m=0.16, last_s=15.0), flight(obstacle_m=0.14, last_s=17.0))
+    found = result_of(comparison, row, LINKS, ("point", "point"), flights)
+    assert (found.succeeded, found.collided, found.obstacle_m, found.last_s) == (1, 1, 0.14, 16.0)
+    fine = [flight(obstacle_m=0.16, last_s=last) for last in (16.0, 17.9, 18.2)]
+    reached = [
+        result_of(comparison, row, LINKS, ("point", "point"), entries(*some)).reaches_bar
+        for some in (fine[:2], fine[1:])
+    ]
+    assert reached == [True, False]
+
+
 def test_rows_are_chosen_by_the_beginning_of_their_labels(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -94,6 +115,10 @@ def test_faults_are_refused_before_anything_flies(tmp_path: Path) -> None:
         compare("rmader", rows=("speed",), out=tmp_path / "out")
     with pytest.raises(InputError, match="has one mission"):
         compare("rmader", missions=tmp_path, out=tmp_path / "out")
+    with pytest.raises(InputError, match="has no world"):
+        compare("rmader", worlds=tmp_path, out=tmp_path / "out")
+    with pytest.raises(InputError, match=r"there is no file \*\.csv"):
+        compare("maze-dense", worlds=tmp_path, out=tmp_path / "out")
     with pytest.raises(InputError, match="did you mean 'rmader'"):
         compare("rmade", out=tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -72,6 +72,10 @@ def compare(
         Path | None,
         typer.Option(metavar="FOLDER", help="Mission files of LSC's planners, in place of drawn missions."),
     ] = None,
+    worlds: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="World files (CSV) of LSC's planners, in place of drawn worlds."),
+    ] = None,
     jobs: Jobs = None,
     out: Begun = None,
     as_json: AsJson = False,
@@ -79,7 +83,7 @@ def compare(
     """Fly the scene of a published planner with its limits, and show ours beside the published figures."""
     from outrider.compare.command import compare as comparing
 
-    raise typer.Exit(comparing(name, seeds, jobs, out, as_json, tuple(row or ()), missions))
+    raise typer.Exit(comparing(name, seeds, jobs, out, as_json, tuple(row or ()), missions, worlds))
 
 
 def gallery(

@@ -11,6 +11,7 @@ from typing import Any
 from outrider.compare.comparison import Comparison, Row
 from outrider.compare.missions import folder_of
 from outrider.compare.scene import Places, Scene, document_of
+from outrider.compare.worlds import folder_of as folder_of_worlds
 from outrider.errors import InputError
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.preparation import prepared
@@ -21,13 +22,23 @@ from outrider.yaml_files.yaml_file import load, read
 _KEY_LENGTH = 20
 
 
-def cells_of(comparison: Comparison, where: Path, rows: Sequence[Row], folder: Path | None) -> list[Cell]:
+def cells_of(
+    comparison: Comparison,
+    where: Path,
+    rows: Sequence[Row],
+    folder: Path | None,
+    worlds: Path | None = None,
+) -> list[Cell]:
     """Return the cell of each of ``rows``, checked with the first seed; ``where`` is the comparison's file.
 
-    ``folder``: mission files in place of drawn ones. Raises InputError before anything is flown.
+    ``folder``: mission files in place of drawn ones; ``worlds``: a folder of world files in place of drawn
+    worlds. Raises InputError before anything is flown.
     """
     if folder is not None and comparison.missions is None:
         raise InputError(f"--missions {folder}: {comparison.name} has one mission; allowed: no --missions")
+    if worlds is not None and not any(row.world or comparison.world for row in rows):
+        raise InputError(f"--worlds {worlds}: {comparison.name} has no world; allowed: no --worlds")
+    boxes = [] if worlds is None else folder_of_worlds(worlds)
     file = where.parent / comparison.scenario
     base: dict[str, Any] = load(file, Scenario).model_dump(mode="json")
     found = []
@@ -43,6 +54,8 @@ def cells_of(comparison: Comparison, where: Path, rows: Sequence[Row], folder: P
             goal_radius=comparison.goal_radius,
             vehicles=count,
             missions=comparison.missions,
+            world=row.world or comparison.world,
+            worlds=tuple(tuple(box.model_dump(mode="json") for box in one) for one in boxes),
             given=tuple((_places(one.starts), _places(one.goals)) for one in given),
         )
         place = f"{where}: {row.label}"

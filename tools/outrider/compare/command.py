@@ -12,7 +12,7 @@ from outrider.compare.cells import cells_of
 from outrider.compare.comparison import Comparison, Row
 from outrider.compare.flying import RUN, TRACED
 from outrider.compare.results import Result, result_of
-from outrider.compare.scene import Scene
+from outrider.compare.scene import Scene, scenario_of
 from outrider.errors import InputError
 from outrider.interruption import INTERRUPTED
 from outrider.resources import find
@@ -35,19 +35,21 @@ def compare(
     as_json: bool = False,
     rows: tuple[str, ...] = (),
     missions: Path | None = None,
+    worlds: Path | None = None,
     run: str = RUN,
 ) -> int:
     """Fly the comparison ``name``, a file or a shipped one, and return the exit status.
 
     The status is 0 if every flight succeeded, 1 if one did not, and 3 after an interruption. A missed bar is
     a result, not an error. ``rows``: labels to fly, or beginnings of labels; by default all. ``missions``: a
-    folder with mission files of LSC's planners, in place of drawn ones. Writes ``compare.json``,
+    folder with mission files of LSC's planners, in place of drawn ones; ``worlds``: one with their world
+    files. Writes ``compare.json``,
     ``compare.md`` and ``compare.png`` beside the journal in ``out`` (default ``runs/sweep-compare-NAME``).
     """
     path = find("comparisons", name)
     comparison = load(path, Comparison)
     chosen = _chosen(comparison, rows)
-    found = cells_of(comparison, path, chosen, missions)
+    found = cells_of(comparison, path, chosen, missions, worlds)
     title = f"compare-{comparison.name}"
     folder = places.prepare(out, title)
     numbers = range(TRACED, TRACED + (seeds or comparison.seeds))
@@ -98,10 +100,13 @@ def _result(comparison: Comparison, row: Row, cell: Cell, entries: Flown, number
 
 
 def _draw(comparison: Comparison, found: list[Cell], entries: Flown, folder: Path) -> None:
-    traces = {}
+    traces, obstacles = {}, {}
     for cell in found:
         summary = entries[cell.key, TRACED].summary
         if summary is not None and "trace" in summary:
             traces[cell.label] = summary["trace"]
+            scene = Scene.model_validate_json(cell.document)
+            obstacles[cell.label] = scenario_of(scene, TRACED).obstacles
     if traces:
-        picture.draw(f"{comparison.name}, seed {TRACED}: paths from above", traces, folder / PICTURE)
+        title = f"{comparison.name}, seed {TRACED}: paths from above"
+        picture.draw(title, traces, folder / PICTURE, obstacles)

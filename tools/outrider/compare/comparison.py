@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, JsonValue, model_validator
 
+from outrider.compare.world import World
 from outrider.scenarios.part import Length, Part, Position, Share
 from outrider.sweep.grid import Key
 
@@ -26,6 +27,10 @@ class Measure(Part):
     kind: Literal["ball", "box", "ellipsoid"] = "ball"
     least: Length = Field(description="m in that measure; less is a collision")
     downwash: float = Field(1.0, ge=1.0, le=20.0, description="of an ellipsoid: height over width")
+    obstacle: Length | None = Field(
+        None,
+        description="m from a centre to the surface of an obstacle; less is a collision. Null: none counts",
+    )
 
     @model_validator(mode="after")
     def _only_ellipsoids(self) -> Self:
@@ -53,6 +58,7 @@ class Bar(Part):
     """What a row shall reach."""
 
     mean_s: Figure | None = Field(None, description="s, mean time of arrival at most")
+    last_s: Figure | None = Field(None, description="s, last arrival at most, mean over the flights")
     success: Share = Field(1.0, description="share of the flights that succeed, at least")
     plan_ms: Figure | None = Field(None, description="ms, CPU time of a plan at most, median")
 
@@ -62,6 +68,7 @@ class Row(Part):
 
     label: Text = Field(description="names the row, and the published figures that belong to it")
     set: dict[Key, JsonValue] = Field({}, description="values of the scenario by dotted key")
+    world: World | None = Field(None, description="obstacles of this row, in place of the comparison's")
     bar: Bar | None = None
 
 
@@ -72,6 +79,7 @@ class Published(Part):
     row: Text = Field(description="label of a row of this file")
     success: Share | None = Field(None, description="share of the flights without a collision that arrive")
     mean_s: Figure | None = Field(None, description="s, mean time")
+    last_s: Figure | None = Field(None, description="s, time until all have arrived, mean over the flights")
     worst_s: Figure | None = Field(None, description="s, longest time")
     path_m: Figure | None = Field(None, description="m, length of a path")
     acceleration2: Figure | None = Field(None, description="m²/s³, ∫a² of a vehicle")
@@ -94,6 +102,9 @@ class Comparison(Part):
         description="m: a vehicle has arrived when it is this near for the first time"
     )
     missions: Missions | None = Field(None, description="null: starts and goals are the scenario's")
+    world: World | None = Field(
+        None, description="obstacles, drawn for each seed and added to the scenario's; null: none are drawn"
+    )
     seeds: int = Field(30, ge=1, le=100_000, description="flights of each row")
     set: dict[Key, JsonValue] = Field({}, description="values of the scenario for all rows, by dotted key")
     rows: tuple[Row, ...] = Field(min_length=1, max_length=100)

@@ -38,6 +38,8 @@ def fly(task: Task) -> dict[str, Any]:
     has_jerk = vehicle.motion == "multirotor" or vehicle.point_window_us > 0
     found = document(figures(outcome, scene.measure, scene.goal_radius, has_jerk=has_jerk))
     found |= _planning(outcome)
+    obstacle = outcome.truth.obstacles.minimum
+    found |= {"obstacle_m": round(float(obstacle), 4) if np.isfinite(obstacle) else None}
     found |= {"d_min_violations": outcome.truth.vehicles.count, "failure": outcome.failure}
     return {**found, "trace": _trace(outcome)} if task.seed == TRACED else found
 

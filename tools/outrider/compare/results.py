@@ -16,10 +16,11 @@ from outrider.sweep.tasks import Entry
 class Result:
     """Result of one row.
 
-    A flight ``succeeds`` if every vehicle arrives and no two collide in the scene's measure. ``failed`` runs
+    A flight ``succeeds`` if every vehicle arrives and none collides in the scene's measure. ``failed`` runs
     have no flight. Times (s) are of flights in which all vehicles arrive: ``mean_s`` over vehicles and
     flights, ``last_s`` the mean over flights of the last arrival, ``worst_s`` the longest. ``separation_m``:
-    least of all flights in the scene's measure. ``plan_ms_p50``, ``plan_ms_p99``: medians of the flights.
+    least of all flights in the scene's measure; ``obstacle_m``: least from a surface. ``plan_ms_p50``,
+    ``plan_ms_p99``: medians of the flights.
     """
 
     row: str
@@ -34,6 +35,7 @@ class Result:
     last_s: float | None
     worst_s: float | None
     separation_m: float | None
+    obstacle_m: float | None
     path_m: float | None
     acceleration2: float | None
     jerk2: float | None
@@ -71,8 +73,12 @@ def result_of(
     ``links``: those of its scenario. ``vehicle``: its name, and what moves it.
     """
     flights = [entry.summary for entry in entries if entry.summary is not None]
-    least = comparison.measure.least
-    collided = [one for one in flights if one["separation_m"] is not None and one["separation_m"] < least]
+    measure = comparison.measure
+    collided = [
+        one
+        for one in flights
+        if _below(one["separation_m"], measure.least) or _below(one["obstacle_m"], measure.obstacle)
+    ]
     late = [one for one in flights if one["arrived"] < one["vehicles"]]
     fine = [one for one in flights if one not in collided and one not in late and not one["failure"]]
     there = [one for one in flights if one not in late]
@@ -88,9 +94,8 @@ def result_of(
         mean_s=_mean(there, "mean_s"),
         last_s=_mean(there, "last_s"),
         worst_s=max((one["last_s"] for one in there), default=None),
-        separation_m=min(
-            (one["separation_m"] for one in flights if one["separation_m"] is not None), default=None
-        ),
+        separation_m=min(_values(flights, "separation_m"), default=None),
+        obstacle_m=min(_values(flights, "obstacle_m"), default=None),
         path_m=_mean(there, "path_m"),
         acceleration2=_mean(there, "acceleration2"),
         jerk2=_mean(there, "jerk2"),
@@ -114,9 +119,13 @@ def _reaches(row: Row, found: Result) -> bool | None:
     if row.bar is None:
         return None
     bar = row.bar
-    pairs = ((bar.mean_s, found.mean_s), (bar.plan_ms, found.plan_ms_p50))
+    pairs = ((bar.mean_s, found.mean_s), (bar.last_s, found.last_s), (bar.plan_ms, found.plan_ms_p50))
     good = all(most is None or (value is not None and value <= most) for most, value in pairs)
     return good and found.success >= bar.success
+
+
+def _below(distance: float | None, least: float | None) -> bool:
+    return distance is not None and least is not None and distance < least
 
 
 def _values(flights: Sequence[Mapping[str, Any]], name: str) -> list[float]:

@@ -10,14 +10,16 @@ from rich.table import Table
 from outrider.compare.comparison import Comparison, Published
 from outrider.compare.results import Result
 
-WIDTH = 150
+WIDTH = 160
 _HEADS = (
     "row",
     "planner",
     "success",
     "mean, s",
+    "all, s",
     "worst, s",
     "least, m",
+    "surface, m",
     "path, m",
     "∫a²",
     "∫j²",
@@ -47,9 +49,11 @@ def caption(comparison: Comparison) -> str:
     """Return what the columns mean."""
     measure = comparison.measure
     limits = f"within {comparison.goal_radius:g} m, and no two are nearer than {measure.least:g} m"
+    if measure.obstacle is not None:
+        limits += f", none is nearer to an obstacle than {measure.obstacle:g} m"
     return (
-        f"success: all arrive {limits} ({measure.kind}); mean over vehicles, worst of all flights; plan: CPU"
-        f" time, p50 / p99; {_NOTHING}: not published"
+        f"success: all arrive {limits} ({measure.kind}); mean over vehicles; all: last arrival, mean over"
+        f" flights; worst: last arrival of all flights; plan: CPU time, p50 / p99; {_NOTHING}: not published"
     )
 
 
@@ -80,8 +84,10 @@ def lines(comparison: Comparison, result: Result) -> Iterator[tuple[str, ...]]:
         f"outrider ({result.vehicle})",
         f"{result.succeeded} of {result.seeds}",
         _number(result.mean_s, 2),
+        _number(result.last_s, 2),
         _number(result.worst_s, 2),
         _number(result.separation_m, 3),
+        _number(result.obstacle_m, 3),
         _number(result.path_m, 2),
         _number(result.acceleration2, 0),
         _number(result.jerk2, 0),
@@ -97,7 +103,9 @@ def _published(one: Published) -> tuple[str, ...]:
         one.planner,
         _NOTHING if one.success is None else f"{100.0 * one.success:g} %",
         _number(one.mean_s, 2),
+        _number(one.last_s, 2),
         _number(one.worst_s, 2),
+        _NOTHING,
         _NOTHING,
         _number(one.path_m, 2),
         _number(one.acceleration2, 0),
