@@ -16,7 +16,7 @@ from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.values.horizon import Array
 from outrider.certify.command import certify
 from outrider.certify.histories import Kind
-from outrider.certify.reading import read
+from outrider.certify.reading import read, terms_of
 from outrider.certify.verdict import Verdict, judge
 from outrider.errors import InputError
 from outrider.scenarios.options import apply
@@ -176,3 +176,13 @@ def test_a_planner_without_these_constraints_is_found(
     assert verdict(fly(tmp_path / "clean", obstacles, cap_s=3.0)).findings == ()
     breaks(monkeypatch)
     assert NEARER in whats(verdict(fly(tmp_path / "broken", obstacles, cap_s=3.0)))
+
+
+def test_plans_are_held_to_the_least_distance_of_obstacles_that_companions_have() -> None:
+    of = apply(scenario("boxes"), CERTIFIED)
+    certified = of.companion.certified.model_copy(update={"d_min_obstacle": 0.3})
+    companion = of.companion.model_copy(update={"certified": certified})
+    other = terms_of(of.model_copy(update={"companion": companion}))
+    same = terms_of(of)
+    assert same.surface - other.surface == pytest.approx(of.companion.field.d_min - 0.3)
+    assert other == same._replace(surface=other.surface)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import between, further, margin
+from companion.avoidance.certified.margins import between, from_surfaces, further
 from companion.config.obstacles import Obstacle
 from outrider.certify.evidence import Terms
 from outrider.errors import Fault, InputError
@@ -110,5 +110,5 @@ def _terms(config: FlyConfig) -> Terms:
         companion.planar,
         further(certified),
         companion.field.downwash,
-        companion.field.d_min + margin(certified, companion.field, companion.limits),
+        from_surfaces(certified, companion.field, companion.limits),
     )

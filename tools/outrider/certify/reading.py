@@ -10,7 +10,7 @@ from pathlib import Path
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import between, further, margin
+from companion.avoidance.certified.margins import between, from_surfaces, further
 from companion.config.obstacles import Obstacle
 from companion.values.components import COMPONENT
 from mavlink_bridge.errors import LogError, PlanWireError
@@ -126,7 +126,7 @@ def terms_of(scenario: Scenario) -> Terms:
         config.planar,
         further(certified),
         config.field.downwash,
-        config.field.d_min + margin(certified, config.field, limits),
+        from_surfaces(certified, config.field, limits),
     )
 
 
