@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from companion.avoidance.certified.margins import between, further, margin
+from companion.avoidance.certified.margins import between, from_surfaces, further, margin
 from companion.config import CompanionConfig
 from companion.goals.roofs import Roofs
 from companion.obstacles.static import FIRST_ID
@@ -117,5 +117,6 @@ def between_columns(config: CompanionConfig) -> float:
 
 def beside_column(config: CompanionConfig) -> float:
     """Return the least distance (m) of a column from a surface that flies no committed plan."""
-    own = margin(config.certified, config.field, config.limits)
-    return config.field.d_min + own + further(config.certified)
+    certified, field, limits = config.certified, config.field, config.limits
+    least = max(field.d_min + margin(certified, field, limits), from_surfaces(certified, field, limits))
+    return least + further(certified)

@@ -73,3 +73,13 @@ def test_nobody_lands_on_a_box_however_far_below_it_is(config: CompanionConfig) 
         assert settling.clear
         beside = here * (1.0, 1.0, 0.0) + (0.0, 0.0, box.at[2])
         assert FixedObstacles([box]).distance(beside)[0] >= config.guard.landing_clearance
+
+
+def test_columns_keep_a_larger_distance_of_obstacles_and_no_smaller_one_than_of_others() -> None:
+    def least(d_min_obstacle: float | None) -> float:
+        certified = CERTIFIED.certified.model_copy(update={"d_min_obstacle": d_min_obstacle})
+        return beside_column(CERTIFIED.model_copy(update={"certified": certified}))
+
+    d_min = CERTIFIED.field.d_min
+    assert least(0.5 * d_min) == least(None)
+    assert least(d_min + 1.0) == pytest.approx(least(None) + 1.0)
