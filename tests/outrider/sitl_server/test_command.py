@@ -209,9 +209,9 @@ def test_a_port_in_use_is_named_with_what_to_do(run: Run) -> None:
     ("options", "said"),
     [
         (("--flavour", "inav"), "--flavour inav: allowed are ardupilot, px4"),
-        (("--count", "0"), "'--count'"),
-        (("--speedup", "0"), "'--speedup'"),
-        (("--speedup", "nan"), "'--speedup'"),
+        (("--count", "0"), "--count"),
+        (("--speedup", "0"), "--speedup"),
+        (("--speedup", "nan"), "--speedup"),
         (
             ("--first-id", "200", "--count", "100"),
             "--count 100 from --first-id 200: system ids would go up to 299",
