@@ -50,6 +50,7 @@ def check(vehicle: SingleVehicle, pressed: Pressed) -> None:
     assert (pressed.places <= high + 0.1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("settings", "flavour", "response"), FLIGHTS)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_neighbour_presses_it_out_of_its_box(settings, flavour, response, seed):

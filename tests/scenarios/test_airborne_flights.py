@@ -46,6 +46,7 @@ def ordered(flown: Flown, system: int) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("world", [{}, ROUGH], ids=["calm", "rough"])
 def test_it_begins_and_ends_in_the_air(flavour: str, world: dict[str, Any], tmp_path: Path) -> None:

@@ -32,6 +32,7 @@ def agreements(companion: Companion) -> Agreements:
     return avoidance._flight.agreements
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault", [{"kind": "freeze", "for_s": 3.0}, {"kind": "vanish"}], ids=["hangs", "ends"]
 )
@@ -62,6 +63,7 @@ def test_a_plan_is_kept_whose_companion_is_silent(
     assert flown.summary["others_converge_s"] is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.slow)])
 def test_a_companion_that_restarts_in_the_air_begins_where_the_plan_before_ends(
     flavour: str, tmp_path: Path

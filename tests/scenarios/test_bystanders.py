@@ -48,7 +48,8 @@ def test_they_say_where_they_are_and_share_no_plan(tmp_path: Path) -> None:
     assert kinds[Tunnel] == {11, 12, 13}
 
 
-@pytest.mark.parametrize("avoidance", ["field", pytest.param("certified", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("avoidance", ["field", "certified"])
 def test_who_comes_through_is_evaded(avoidance: str, tmp_path: Path) -> None:
     """A stranger at 2 m/s, straight through the ring: the n = 0 fallback is enough, and so is yielding to
     it where plans are certified."""

@@ -105,17 +105,16 @@ def fly(directory: Path, *changes: dict[str, Any], reference: int | None = None)
     return flown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [
         {},
         {"faults": [*MINUTES, *DRIFT]},
-        pytest.param({"faults": [BLIND]}, marks=pytest.mark.slow),
+        {"faults": [BLIND]},
         {"faults": [*MINUTES, BLIND, {**BLIND, "vehicle": 13}]},
-        pytest.param({"faults": [UTC_STEP]}, marks=pytest.mark.slow),
-        pytest.param(
-            {"faults": [*MINUTES, CLOCK_STEP], **DISCIPLINED, **NO_AUTOPILOT}, marks=pytest.mark.slow
-        ),
+        {"faults": [UTC_STEP]},
+        {"faults": [*MINUTES, CLOCK_STEP], **DISCIPLINED, **NO_AUTOPILOT},
     ],
     ids=[
         "sound clocks",
@@ -163,6 +162,7 @@ def test_links_too_slow_for_the_bound_hold_the_plan_and_say_so(tmp_path: Path) -
     assert all("Fleet time is too uncertain: plan held" in texts(flown, system) for system in (11, 12, 13))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [{"kind": "freeze", "for_s": 3.0}, {"kind": "vanish"}], ids=str)
 def test_the_backup_node_has_the_time_of_its_companion(fault: dict[str, Any], tmp_path: Path) -> None:
     """Also where the clock of both is off by minutes."""

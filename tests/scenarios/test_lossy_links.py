@@ -39,6 +39,7 @@ def dropped(flown: Flown) -> int:
     return int(messages["dropped"] or 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [pytest.param(row, id=row.name) for row in ROWS])
 def test_poor_links_hold_up_nobody(row: Poor, tmp_path: Path) -> None:
     of = scenario("antipodal-8", {"vehicles": row.vehicles, "links": row.links})

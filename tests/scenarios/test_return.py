@@ -19,6 +19,7 @@ def far_off(flavour, **settings):
     return vehicle, start
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
 def test_who_came_back_stands_where_it_started(flavour):
     vehicle, start = far_off(flavour)

@@ -48,6 +48,7 @@ def test_the_same_seed_is_the_same_flight(
     assert logs(again) == logs(first)
 
 
+@pytest.mark.slow
 def test_another_seed_is_another_flight(first: Flown, tmp_path_factory: pytest.TempPathFactory) -> None:
     other = fly(OF, 6, tmp_path_factory.mktemp("other"))
     check(other)

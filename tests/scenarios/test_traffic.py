@@ -13,12 +13,13 @@ from tests.scenarios.flight_facts import check_told, clock, spoke
 from tests.scenarios.lockstep_flights import fly, scenario
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "companion",
     [
         {"neighbour_prediction": "held"},
         {"neighbour_prediction": "velocity"},
-        pytest.param({"avoidance": "certified", "turning_sense": "right"}, marks=pytest.mark.slow),
+        {"avoidance": "certified", "turning_sense": "right"},
     ],
     ids=["held", "velocity", "certified"],
 )

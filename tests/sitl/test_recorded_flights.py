@@ -20,6 +20,8 @@ from mavlink_bridge.tlog.log import TlogWriter, read_tlog
 from outrider.errors import InputError
 from tests.sitl.autopilot_rig import FIREFLY
 
+pytestmark = pytest.mark.slow
+
 FLIGHTS = Path(__file__).parents[1] / "data" / "flights"
 LOGS = ("copter-full", "copter-pvy", "px4-pvay")
 BEAT = 1.2
@@ -176,7 +178,6 @@ def test_the_swarms_hold_what_was_recorded(swarms: dict[str, Swarm]) -> None:
             assert len(vehicle.setpoints) == pytest.approx(50.0 * (last - first), rel=0.01)
 
 
-@pytest.mark.slow
 def test_without_the_response_it_is_where_it_is_told_to_be(pairs: dict[str, Pair]) -> None:
     """So the recorded vehicles' lag is the response's doing, and not the rest's."""
     flight = pairs["px4-pvay"].flight

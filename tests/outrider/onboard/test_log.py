@@ -80,6 +80,7 @@ def places(log: Path, system: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return values[:, 0], values[:, 1:4], values[:, 4:7]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flown", "log"), logs())
 def test_what_would_have_been_sent_is_sound(flown: Flown, log: Path, run: Run, tmp_path: Path) -> None:
     """Against the log and the limits themselves, not the figures that the command makes of them."""

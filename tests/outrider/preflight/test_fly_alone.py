@@ -110,6 +110,7 @@ def test_without_a_go_nothing_arms_and_a_go_counts_in_turn() -> None:
     assert found(three.verdict(), "vehicle 3", "flight").text == "the operator ordered to land"
 
 
+@pytest.mark.slow
 def test_it_flies_the_box_and_comes_back() -> None:
     flying = fleet(fly=FlightTerms(100, 4.0, Box(-7.0, 6.0, 2.0), go=True))
     autopilot = flying.autopilots[1]

@@ -47,6 +47,7 @@ def short(name: str, **companion: Any) -> Scenario:
     return scenario(name, **changes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in SCENARIOS],

@@ -58,6 +58,7 @@ def test_they_are_also_where_some_leave(swarm: Swarm) -> None:
     assert not swarm.faults()
 
 
+@pytest.mark.slow
 @FLIGHTS
 @given(swarms(leave=True))
 def test_who_lacks_an_agreement_does_not_replan(swarm: Swarm) -> None:
@@ -111,6 +112,7 @@ def test_who_returns_flies_once_those_that_have_left_answer_it() -> None:
     assert not swarm.faults()
 
 
+@pytest.mark.slow
 @FLIGHTS
 @given(st.integers(0, 2**16))
 def test_who_restarts_gives_no_epoch_a_second_plan(seed: int) -> None:
@@ -171,6 +173,7 @@ def test_eight_opposite_on_a_circle_arrive_in_time(radius: float, seed: int, sec
     assert all(made.found for made in swarm.made())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rough", "seconds"),
     [
