@@ -36,7 +36,7 @@ def agreements(companion: Companion) -> Agreements:
 @pytest.mark.parametrize(
     "fault", [{"kind": "freeze", "for_s": 3.0}, {"kind": "vanish"}], ids=["hangs", "ends"]
 )
-@pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
 def test_a_plan_is_kept_whose_companion_is_silent(
     fault: dict[str, Any], flavour: str, tmp_path: Path
 ) -> None:
@@ -64,7 +64,7 @@ def test_a_plan_is_kept_whose_companion_is_silent(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
 def test_a_companion_that_restarts_in_the_air_begins_where_the_plan_before_ends(
     flavour: str, tmp_path: Path
 ) -> None:

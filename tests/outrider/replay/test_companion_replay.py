@@ -24,7 +24,7 @@ from tests.outrider.said import Run
 from tests.outrider.shipped import FIREFLY, scenario
 
 SHORT: dict[str, Any] = {"cap_s": 2.0, "airborne": True}
-FAST = {"antipodal-8", "escort"}
+FAST = {"antipodal-8"}
 """Scenarios that are also flown by `make test`."""
 SCENARIOS = sorted(path.stem for path in (config_root() / "scenarios").glob("*.yaml"))
 WAYS: dict[str, dict[str, Any]] = {
@@ -47,7 +47,6 @@ def short(name: str, **companion: Any) -> Scenario:
     return scenario(name, **changes)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in SCENARIOS],
