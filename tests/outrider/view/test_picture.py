@@ -19,6 +19,7 @@ from outrider.scene.planes import MOST, between, facing
 from outrider.scene.scene import Scene, staged
 from outrider.scene.snapshot import KNOTS, Snapshot, State, euler_attitude, nearest, padded
 from outrider.view import shapes
+from outrider.view.camera import followed
 from outrider.view.panel import struck, table
 from tests.outrider.shipped import SCENARIOS, scenario
 
@@ -142,6 +143,18 @@ def test_a_click_strikes_its_level_in_front_of_the_eye(
     if place is not None:
         assert place[2] == pytest.approx(height, abs=1e-6 * (1.0 + abs(eye[2])) + 1e-6)
         assert (place - eye) @ along >= 0.0
+
+
+def test_the_picture_follows_smoothly_and_at_once_where_the_time_jumps() -> None:
+    """A run that is paused and sought shows one snapshot only: it has to be in the picture."""
+    focus, middle = np.zeros(3), np.array([40.0, -3.0, 5.0])
+    for elapsed in (-15.0, 5.0):
+        np.testing.assert_array_equal(followed(focus, middle, elapsed), middle)
+    near = followed(focus, middle, 0.05)
+    assert 0.0 < np.linalg.norm(near) < 0.5 * np.linalg.norm(middle)
+    for _ in range(100):
+        near = followed(near, middle, 0.05)
+    np.testing.assert_allclose(near, middle, atol=1e-3)
 
 
 def test_what_a_log_brings_in_stays_text() -> None:

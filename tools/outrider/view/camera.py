@@ -5,9 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
+
+from outrider.view.trails import GAP
 
 if TYPE_CHECKING:
     import viser
+
+Array = NDArray[np.floating]
 
 AZIMUTH, ELEVATION, FIELD = -1.15, 0.5, float(np.radians(40.0))
 """Direction of the whole scene, as in the report, and the vertical field of view (rad)."""
@@ -15,6 +20,8 @@ TOP_FIELD = float(np.radians(1.0))
 """Vertical field of view (rad) from above: so narrow that a height of a tenth of the scene's reach shifts a
 vehicle by less than 0.1 % of it. Viser has no camera without perspective."""
 _ROOM = 1.05
+_SHARE = 0.15
+"""Part of the way to the vehicles that the middle of the picture moves for one snapshot."""
 
 
 def distance(reach: float, field: float, aspect: float) -> float:
@@ -38,6 +45,15 @@ def above(camera: viser.CameraHandle, reach: float, aspect: float) -> None:
     height = distance(reach, TOP_FIELD, aspect)
     # Not quite straight down: there the direction to the north would be undefined.
     _aim(camera, reach, TOP_FIELD, np.array([0.0, -1e-4 * height, height]))
+
+
+def followed(focus: Array, middle: Array, elapsed: float) -> Array:
+    """Return where the middle of the picture (3,) moves from ``focus`` (3,) to follow ``middle`` (3,), m.
+
+    It moves a part of the way, so that the picture does not shake; all of it where the time of the flight
+    jumped: ``elapsed`` (s) since the snapshot before is negative or long.
+    """
+    return middle if not 0.0 <= elapsed <= GAP else focus + _SHARE * (middle - focus)
 
 
 def _aim(

@@ -59,6 +59,7 @@ class Renderer:
         self._painted = colours(count, scene.tasked)
         self._colours = linear(self._painted)
         self._focus = np.array(scene.centre)
+        self._shown: float | None = None
         self._layers = Layers()
         stage.set_up_direction("+z")
         stage.configure_default_lights(cast_shadow=False)
@@ -166,8 +167,11 @@ class Renderer:
             mover.visible = bool(np.isfinite(at).all())
             if mover.visible:
                 mover.position = at
+        elapsed = 0.0 if self._shown is None else moment.time - self._shown
+        self._shown = moment.time
         if self.follows and there.any():
-            self._follow(moment.position[there].mean(axis=0))
+            self._focus = camera.followed(self._focus, moment.position[there].mean(axis=0), elapsed)
+            self._world.position = -self._focus
 
     def _draw_plans(self, moment: Snapshot) -> None:
         ways = moment.plan[..., :3]
@@ -193,11 +197,6 @@ class Renderer:
             paint = np.broadcast_to(self._colours[:, None, None], lines.shape)
             handle.colors = np.ascontiguousarray(paint[there])
             handle.points = lines[there]
-
-    def _follow(self, middle: Single) -> None:
-        """Move the focus a part of the way to ``middle`` (3,), so that the picture does not shake."""
-        self._focus = self._focus + 0.15 * (middle - self._focus)
-        self._world.position = -self._focus
 
     def _many(
         self, name: str, mesh: shapes.Mesh, paint: NDArray[np.uint8], scale: float, **more: object
