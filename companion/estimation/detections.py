@@ -84,7 +84,7 @@ def _accuracies(
     horizontal, vertical = message.horizontal_accuracy, message.vertical_accuracy
     # The accuracy of a heading is an angle in the horizontal plane.
     bearing = radians(config.sigma_bearing_deg) if heading is None else heading * level / distance
-    if heading is not None and not 0.0 < bearing <= _MAX_BEARING_RAD:
+    if heading is not None and not (heading > 0.0 and bearing <= _MAX_BEARING_RAD):
         return inf, inf
     across = max(distance * bearing, _MIN_SIGMA_M)
     if horizontal is None or vertical is None:

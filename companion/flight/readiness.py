@@ -58,6 +58,8 @@ UTC = 1_000_000
 """Interval (µs) of SYSTEM_TIME, which is requested where it is a source of fleet time."""
 _ORIGIN_US = 10_000_000
 """Time (µs) between two requests for the origin in flight."""
+_CONFIRM_US = 2_100_000
+"""Time (µs) from a change of the origin to the next request; ``Origins`` refuses earlier ones for 2 s."""
 _ORIGIN_CALL = (
     mavlink.MAV_CMD_REQUEST_MESSAGE,
     (float(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -224,12 +226,13 @@ class Readiness:
     def confirm_origin(self, now: int, view: View) -> list[Message]:
         """Return the request for the origin in flight, if it is due.
 
-        It is due every 10 s, because the message about a new origin may be lost, and at once after a change
-        of the origin, because the message may have been an old one.
+        It is due every 10 s, because the message about a new origin may be lost, and soon after a change of
+        the origin, because the message may have been an old one: as soon as ``Origins`` takes back an
+        earlier origin.
         """
         if view.local is not self._local:
             # Before the flight the origin was requested all the time.
-            self._confirm_at = now + (_ORIGIN_US if self._local is None else 0)
+            self._confirm_at = now + (_ORIGIN_US if self._local is None else _CONFIRM_US)
             self._local = view.local
         if now < self._confirm_at or not self._vehicle.alive:
             return []

@@ -162,7 +162,7 @@ class Pilot:
         config = self._config
         if config.task != "escort" or config.avoidance == "certified" or view.target is None:
             return inf
-        return config.limits.within(config.field.margin(1)).box_min[2]
+        return self.planned_limits.within(config.field.margin(1)).box_min[2]
 
     def go(self, height: float) -> bool:
         """Accept the operator's go: climb to ``height`` (m) above the start; return whether it is accepted.

@@ -80,11 +80,14 @@ class Way:
             self._followed = self._search = self._ends = None
             self.enclosed, self.clear = False, True
             return Subgoal(goal, 0.0)
-        if self._follows(clear, here, there):
+        before = self._followed
+        seen = self._follows(clear, here, there)
+        if seen:
             self._search = None
         else:
             self._go_on(clear, here, there)
-        self.clear = self._followed is not None
+        # A new way begins where the vehicle is.
+        self.clear = seen or (self._followed is not None and self._followed is not before)
         if self._followed is None:
             return Subgoal(goal, 0.0)
         subgoal = self._followed.subgoal()

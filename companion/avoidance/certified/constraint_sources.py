@@ -35,7 +35,7 @@ Vehicles that jostle for room rest for a shorter time, and the turn of the goal 
 """
 _BESIDE_M = 0.05
 """Distance (m) of a way from what plans must keep clear of."""
-_AROUND_M, _MOST_BOXES = 20.0, 24
+_AROUND_M, _MOST_BOXES = 20.0, 8
 """How far (m) beside the ends of a way boxes are looked at, and how many of them at most."""
 
 
@@ -240,7 +240,10 @@ class ConstraintSources:
         radii = np.sqrt(self._from_surfaces**2 - above[keep] ** 2) + _BESIDE_M
         boxes = boxes.chosen(keep)
         found = Rectangles(boxes.centres[:, :2], boxes.halves[:, :2], boxes.turns, radii)
-        if len(radii) <= _MOST_BOXES:
+        # No way leads out of a rectangle; a vehicle above or below a box may leave: planes keep it off.
+        beside = (found.distance(np.stack([here[:2], there[:2]])) > 0.0).all(axis=0)
+        found = Rectangles(*(part[beside] for part in found))
+        if len(found.radii) <= _MOST_BOXES:
             return found
         nearest = np.argsort(found.distance(here[None, :2])[0], kind="stable")[:_MOST_BOXES]
         return Rectangles(*(part[nearest] for part in found))

@@ -79,8 +79,13 @@ def is_of_backup(log: Path) -> bool:
 
 
 def terms_of_runs(runs: Sequence[FlyRun]) -> Terms:
-    """Return the terms on which the companions agree. Raises InputError if two of them do not."""
+    """Return the terms on which the companions agree. Raises InputError if two of them do not.
+
+    ``surface`` is a setting of each vehicle; returned is the least.
+    """
     terms = [(run, _terms(run.config)) for run in runs]
+    least = min(each.surface for _, each in terms)
+    terms = [(run, each._replace(surface=least)) for run, each in terms]
     first, agreed = terms[0]
     for run, other in terms[1:]:
         for name, value, wanted in zip(Terms._fields, other, agreed, strict=True):
