@@ -62,7 +62,7 @@ def test_what_stands_in_the_way_is_not_touched(changes: dict[str, Any], tmp_path
 
 @pytest.mark.slow
 def test_who_starts_too_near_is_told_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """0.4 m from a post are one encounter, though the vehicle leaves at once. Other flights refuse that start."""
+    """0.4 m from a post are one encounter, though the vehicle leaves at once. Other flights refuse it."""
     monkeypatch.setattr("outrider.simulation.flight.check_drawn", lambda *_: None)
     changes = {
         "vehicles": 1,
