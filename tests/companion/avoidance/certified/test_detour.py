@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.detour import Detour, Subgoal
 from companion.avoidance.certified.visibility_graph import Discs, Rectangles, free, way
+from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Array
-from tests.companion.avoidance.certified.plans import EPOCH
+from tests.companion.avoidance.certified.plans import EPOCH, STEPS
 from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
 
 LOW, HIGH = np.full(2, -30.0), np.full(2, 30.0)
@@ -204,3 +208,18 @@ def test_without_a_detour_it_stays_in_the_pocket(monkeypatch: pytest.MonkeyPatch
         Detour, "towards", lambda _self, _now, _rest, goal, _discs, *, stalled: Subgoal(goal, 0.0)
     )
     assert flown()[1] > 3.0
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_box_below_an_end_leaves_the_ways_around_the_rest(turned: bool) -> None:
+    """No way leads out of a rectangle: with that of the box there would be none around the post either."""
+    box = {"kind": "box", "at": (0.0, 0.0, 1.5), "size": (4.0, 4.0, 3.0)}
+    post = {"kind": "post", "at": (8.0, 0.0), "radius": 1.0}
+    ends = np.array([[0.0, 0.0, 6.0], [16.0, 0.0, 2.0]])
+    here, there = ends[::-1] if turned else ends
+    config = CompanionConfig.model_validate({"avoidance": "certified", "obstacles": [box, post]})
+    none: Any = SimpleNamespace(left={}, columns=(), resting=lambda *_: {})
+    (discs, _) = ConstraintSources(config, STEPS).resting(0, here, there, none)
+    found = way(here[:2], there[:2], discs, *np.array([[-50.0, -50.0], [50.0, 50.0]]))
+    assert found is not None
+    assert np.abs(found[:, 1]).max() > 1.0
