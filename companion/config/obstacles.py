@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2, degrees, hypot
+from math import atan2, degrees, hypot, inf
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -35,6 +35,11 @@ class Post(Settings):
     at: tuple[_Coordinate, _Coordinate] = Field(description="axis, m east and north of the fleet origin")
     radius: Size = Field(description="m")
     height: Size = Field(100.0, description="m above the fleet origin")
+
+    @property
+    def endless(self) -> Post:
+        """The same post without a top, as planes of committed plans take it."""
+        return self.model_copy(update={"height": inf})
 
 
 class Box(Settings):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from companion.avoidance.certified.visibility_graph import rectangles
 from companion.config.obstacles import Obstacle, Post, Sphere
 from companion.obstacles.boxes import box_of, boxes_of
 from companion.values.boxes import BoxIndex
@@ -57,9 +58,6 @@ class Roofs:
         Boxes further away than ``within`` (m) may be left out.
         """
         rows = self._index.near(place - within, place + within)
-        boxes = self._boxes.chosen(rows[rows != own])
-        off, (cos, sin) = place - boxes.centres[:, :2], boxes.turns.T
-        along = np.stack([cos * off[:, 0] + sin * off[:, 1], cos * off[:, 1] - sin * off[:, 0]], axis=1)
-        beside = np.maximum(np.abs(along) - boxes.halves[:, :2], 0.0)
+        beside = rectangles(self._boxes.chosen(rows[rows != own])).distance(place[None])
         circles = np.linalg.norm(place - self._centres, axis=1) - self._radii
-        return float(min(np.linalg.norm(beside, axis=1).min(initial=np.inf), circles.min(initial=np.inf)))
+        return float(min(beside.min(initial=np.inf), circles.min(initial=np.inf)))

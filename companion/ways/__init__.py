@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from companion.config import CompanionConfig
-from companion.config.obstacles import Obstacle, Post
+from companion.config.obstacles import Post
 
 if TYPE_CHECKING:
     from companion.ways.way import Way
@@ -24,14 +23,7 @@ def way_of(config: CompanionConfig, least: float, effort: int = 1) -> Way | None
 
     # Plans with planes keep away from posts as if these had no top.
     endless = config.avoidance == "certified"
-    obstacles = [_endless(one) if endless else one for one in config.obstacles]
+    obstacles = [one.endless if endless and isinstance(one, Post) else one for one in config.obstacles]
     limits = config.limits.within(config.field.margin(1))
     parts = effort * config.way.parts
     return Way(config.way, obstacles, limits, least, parts, planar=config.planar)
-
-
-def _endless(obstacle: Obstacle) -> Obstacle:
-    """Return a post without a top, and any other obstacle as it is."""
-    if not isinstance(obstacle, Post):
-        return obstacle
-    return obstacle.model_copy(update={"height": math.inf})

@@ -16,7 +16,7 @@ from companion.avoidance.certified.margins import beside, between, fastest, from
 from companion.avoidance.certified.noncooperative import NonCooperative
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.separating_planes import Others
-from companion.avoidance.certified.visibility_graph import Discs, Rectangles
+from companion.avoidance.certified.visibility_graph import Discs, Rectangles, rectangles
 from companion.config import CompanionConfig
 from companion.config.obstacles import Post, Sphere
 from companion.obstacles.boxes import boxes_of
@@ -33,7 +33,7 @@ _RESTED_US, _AT_REST_M = 2_000_000, 0.5
 
 Vehicles that jostle for room rest for a shorter time, and the turn of the goal resolves that.
 """
-_BESIDE_M = 0.05
+BESIDE_M = 0.05
 """Distance (m) of a way from what plans must keep clear of."""
 _AROUND_M, _MOST_BOXES = 20.0, 8
 """How far (m) beside the ends of a way boxes are looked at, and how many of them at most."""
@@ -237,9 +237,8 @@ class ConstraintSources:
         above = np.maximum(boxes.centres[:, 2] - high[2], low[2] - boxes.centres[:, 2]) - boxes.halves[:, 2]
         above = np.maximum(above, 0.0)
         keep = np.flatnonzero(above < self._from_surfaces)
-        radii = np.sqrt(self._from_surfaces**2 - above[keep] ** 2) + _BESIDE_M
-        boxes = boxes.chosen(keep)
-        found = Rectangles(boxes.centres[:, :2], boxes.halves[:, :2], boxes.turns, radii)
+        radii = np.sqrt(self._from_surfaces**2 - above[keep] ** 2) + BESIDE_M
+        found = rectangles(boxes.chosen(keep), radii)
         # No way leads out of a rectangle; a vehicle above or below a box may leave: planes keep it off.
         beside = (found.distance(np.stack([here[:2], there[:2]])) > 0.0).all(axis=0)
         found = Rectangles(*(part[beside] for part in found))
@@ -261,5 +260,5 @@ def _discs(found: list[tuple[tuple[float, ...], float, float]]) -> Discs:
     found = [one for one in found if one[2] < one[1]]
     return Discs(
         np.array([centre for centre, _, _ in found]).reshape(-1, 2),
-        np.array([sqrt(radius * radius - above * above) + _BESIDE_M for _, radius, above in found]),
+        np.array([sqrt(radius * radius - above * above) + BESIDE_M for _, radius, above in found]),
     )

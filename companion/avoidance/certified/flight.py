@@ -12,7 +12,7 @@ from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.commitment import Commitment, HoldReason
 from companion.avoidance.certified.committed import rest_time
-from companion.avoidance.certified.constraint_sources import ConstraintSources
+from companion.avoidance.certified.constraint_sources import BESIDE_M, ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.detour import Detour
 from companion.avoidance.certified.fingerprint import identity
@@ -36,8 +36,8 @@ from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack
 
 _TURNING_SENSES = {"left": -1.0}
-_BESIDE_M, _EFFORT = 0.05, 2
-"""Distance (m) of a way from what plans must keep clear of, and how much of a search is done for a plan."""
+_EFFORT = 2
+"""How much of a search is done for a plan."""
 
 
 class CertifiedFlight:
@@ -57,7 +57,7 @@ class CertifiedFlight:
         self._sources = ConstraintSources(config, steps)
         self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
-        least = from_surfaces(certified, config.field, config.limits) + _BESIDE_M
+        least = from_surfaces(certified, config.field, config.limits) + BESIDE_M
         self._way = way_of(config, least, _EFFORT)
         between = self._sources.between
         downwash = config.field.downwash

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.values.boxes import Boxes
 from companion.values.horizon import Array
 
 _CORNERS = 12
@@ -50,6 +51,12 @@ class Rectangles(NamedTuple):
         cos, sin = self.turns.T[..., None]
         result: Array = self.centres[:, None] + np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
         return result
+
+
+def rectangles(boxes: Boxes, radii: Array | None = None) -> Rectangles:
+    """Return ``boxes`` as seen from above, enlarged by ``radii`` (R,), m; None: not enlarged."""
+    radii = np.zeros(len(boxes.turns)) if radii is None else radii
+    return Rectangles(boxes.centres[:, :2], boxes.halves[:, :2], boxes.turns, radii)
 
 
 _SIGNS = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])

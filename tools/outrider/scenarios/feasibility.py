@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
-from math import ceil, inf, pi
+from math import ceil, pi
 
 import numpy as np
 
@@ -82,8 +82,8 @@ def _near_obstacle(what: str, points: Array, scenario: Scenario, fixed: FixedObs
     endless = scenario.companion.avoidance == "certified"
     for index in (name - FIRST_ID for name in fixed.around(points, least).ids):
         one = obstacles[index]
-        level = endless and isinstance(one, Post)
-        solid = one.model_copy(update={"height": inf}) if level else one
+        solid = one.endless if endless and isinstance(one, Post) else one
+        level = solid is not one
         apart = float(FixedObstacles([solid]).distance(points).min())
         if apart < least:
             at = ", ".join(f"{value:g}" for value in np.round(points[0], 2))
