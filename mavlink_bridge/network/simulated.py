@@ -15,6 +15,7 @@ from zlib import crc32
 
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.network.channel import Channel, Faults
+from mavlink_bridge.network.radio_range import RadioRange
 from mavlink_bridge.node import Datagram
 
 __all__ = ["Channel", "Faults", "NetworkCounters", "SimulatedNetwork"]
@@ -23,8 +24,8 @@ __all__ = ["Channel", "Faults", "NetworkCounters", "SimulatedNetwork"]
 class NetworkCounters(NamedTuple):
     """Counts of datagrams on channels that are counted; each datagram counts once per receiver.
 
-    The sum sent + duplicated equals delivered + dropped + still under way. ``dropped``: lost, cut off, or
-    arrived at a full buffer; ``unrouted``: datagrams on a link that no channel carries.
+    The sum sent + duplicated equals delivered + dropped + still under way. ``dropped``: lost, cut off,
+    out of range, or arrived at a full buffer; ``unrouted``: datagrams on a link that no channel carries.
     """
 
     sent: int
@@ -119,6 +120,7 @@ class SimulatedNetwork:
         self._paths: dict[tuple[str, str], list[list[_Path]]] = {}
         self._sequences: dict[str, int] = {}
         self._buffers: dict[str, _Buffer] = {}
+        self._ranges: dict[str, RadioRange] = {}
         self._cuts: list[_Cut] = []
         self._sent = self._delivered = self._dropped = self._duplicated = self._unrouted = 0
         self._names: set[str] = set()
@@ -165,6 +167,8 @@ class SimulatedNetwork:
                 self._sequences[sender] = number + 1
                 if link not in self._uncounted:
                     self._sent += len(paths)
+                if self._ranges and paths and paths[0].channel in self._ranges:
+                    paths = self._within_range(now, sender, paths)
                 latency, link_name, arrival = -1, "", None
                 for path in paths:
                     if path.deterministic and now >= path.blocked_until:
@@ -175,6 +179,27 @@ class SimulatedNetwork:
                         heappush(path.queue, arrival)
                     else:
                         self._carry(now, number, path, data)
+
+    def limit(self, channel: str, radio: RadioRange) -> None:
+        """Deliver on ``channel`` only what is sent within the range of ``radio``, from now on.
+
+        The other datagrams are dropped, without a random draw. Raises BridgeError for a channel that does not
+        exist.
+        """
+        self._require(channel)
+        self._ranges[channel] = radio
+
+    def _within_range(self, now: int, sender: str, paths: list[_Path]) -> list[_Path]:
+        """Return the ``paths`` to the nodes within range of ``sender``, and count the others as dropped."""
+        hearing = self._ranges[paths[0].channel].hearing(now, sender)
+        found = [path for path in paths if path.receiver in hearing]
+        if paths[0].link not in self._uncounted:
+            self._dropped += len(paths) - len(found)
+        return found
+
+    def _require(self, channel: str) -> None:
+        if channel not in self._names:
+            raise BridgeError(f"no channel is named {channel!r}; there are {', '.join(sorted(self._names))}")
 
     def receive(self, now: int, node: str) -> list[Datagram]:
         """Return the datagrams that have reached ``node`` by ``now`` (µs) since the last call.
@@ -212,8 +237,8 @@ class SimulatedNetwork:
         way still arrive. Raises BridgeError for a channel or a member that does not exist.
         """
         inside = frozenset(members)
-        if channel is not None and channel not in self._names:
-            raise BridgeError(f"no channel is named {channel!r}; there are {', '.join(sorted(self._names))}")
+        if channel is not None:
+            self._require(channel)
         for name in sorted(inside - self._queues.keys()):
             raise BridgeError(f"no node is named {name!r}; there are {', '.join(sorted(self._queues))}")
         self._cuts.append(_Cut(channel, inside, _FOREVER if until is None else until))

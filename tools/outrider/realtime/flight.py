@@ -20,7 +20,7 @@ from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.loops.histogram import Histogram
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.realtime import RealTime
-from outrider.errors import OutriderError
+from outrider.errors import Fault, InputError, OutriderError
 from outrider.realtime.processes import Processes
 from outrider.realtime.shared_page import SharedPage
 from outrider.realtime.spawn import operators_turn, rough, spawn
@@ -70,6 +70,9 @@ class RealTimeFlight:
         priority: bool = False,
         view: RealTimeView | None = None,
     ) -> None:
+        if scenario.links.swarm.range is not None:
+            what = "needs the true places of all vehicles at once; allowed in real time: null"
+            raise InputError(Fault("links.swarm.range", what))
         self.scenario, self.seed = scenario, seed
         self.fleet = Fleet(scenario, vehicle, seed, logs)
         check_drawn(scenario, seed, self.fleet.starts.positions)

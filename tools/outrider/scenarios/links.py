@@ -9,7 +9,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from mavlink_bridge.network.simulated import Faults
-from outrider.scenarios.part import Duration, Milliseconds, Part, Seconds, Share, System
+from outrider.scenarios.part import Duration, Length, Milliseconds, Part, Seconds, Share, System
 
 _WORDS = ("delay_ms", "jitter_ms", "loss", "duplication", "reordering", "burst")
 Burst = Annotated[float, Field(ge=0.0, le=10_000.0)]
@@ -88,11 +88,21 @@ class Links(Part):
         return _faults(result)
 
 
+class SwarmLinks(Links):
+    """Faults of the swarm link, and how far it reaches."""
+
+    range: Length | None = Field(
+        None,
+        description="m, largest true distance of sender and receiver, when a message is sent, at which it"
+        " arrives; null: any",
+    )
+
+
 class AllLinks(Part):
     """The four links of a companion."""
 
     autopilot: Links = Links(delay_ms=5.0)
-    swarm: Links = Links()
+    swarm: SwarmLinks = SwarmLinks()
     target: Links = Links()
     ground: Links = Links()
 

@@ -21,6 +21,7 @@ from outrider.scenarios.scenario import Scenario
 from outrider.scene.changes import Change
 from outrider.simulation.conductor import Conductor, Observation, Stage
 from outrider.simulation.fleet import Fleet
+from outrider.simulation.swarm_range import swarm_range
 from outrider.simulation.team import Instructions, Report, Results, Team, obey, results_of, schedule
 from outrider.simulation.truth_observer import TruthObserver
 from outrider.simulation.vehicles import EPOCH, Share, Vehicles, VehicleSnapshot
@@ -69,6 +70,9 @@ class Flight:
         self.companions = self._vehicles.companions
         self.backup_nodes = list(self._vehicles.backup_nodes.values())
         self.network = self._vehicles.network
+        reach = scenario.links.swarm.range
+        if reach is not None:
+            self.network.limit("swarm", swarm_range(reach, self.autopilots, self.moving))
         self.operator = fleet.operator()
         self.truth = truth_of(scenario)
         self.conductor = Conductor(scenario, fleet.starts, self.operator, EPOCH)

@@ -97,8 +97,8 @@ def schedule(scenario: Scenario, *nodes: Any) -> list[Scheduled]:
 class Team:
     """The other ``count`` − 1 processes of a flight, for its leader; ``watched``: they send snapshots.
 
-    Raises InputError if there are more processes than vehicles, or if a link between processes is faster than
-    their exchange.
+    Raises InputError if there are more processes than vehicles, if a link between processes is faster than
+    their exchange, or if the swarm link has a range, which needs the true places of all vehicles.
     """
 
     def __init__(
@@ -183,6 +183,13 @@ class Team:
         if count > scenario.size:
             raise InputError(
                 Fault("--processes", f"is {count}; allowed: 1 to {scenario.size}, the number of vehicles")
+            )
+        if count > 1 and scenario.links.swarm.range is not None:
+            raise InputError(
+                Fault(
+                    "--processes",
+                    f"is {count}, but links.swarm.range needs the places of all vehicles; allowed: 1",
+                )
             )
         timing, delay = (
             scenario.timing,

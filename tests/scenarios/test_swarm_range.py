@@ -1,0 +1,71 @@
+"""Range of the swarm link in flights: the same seed is the same flight, and nobody hears who is beyond."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mavlink_bridge.tlog.log import read_tlog
+from mavlink_bridge.wire.header import sending_system
+from outrider.errors import InputError
+from outrider.realtime.flight import RealTimeFlight
+from outrider.simulation.flight import Flight
+from tests.scenarios.lockstep_flights import FIREFLY, Flown, fly, scenario
+from tests.scenarios.test_same_seed import facts, logs
+
+RANGE = 5.0
+OF = scenario(
+    "antipodal-8",
+    {
+        "vehicles": 2,
+        "airborne": True,
+        "starts": {"radius": 4.0},
+        "cap_s": 2.0,
+        "links": {"swarm": {"loss": 0.1, "jitter_ms": 15.0, "range": RANGE}},
+    },
+)
+LATEST = 40_000
+"""Largest delay (µs) of a message."""
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> Flown:
+    return fly(OF, 5, tmp_path_factory.mktemp("first"))
+
+
+def heard(flown: Flown, k: int, other: int) -> list[int]:
+    """Times (µs) at which vehicle ``k`` received something of vehicle ``other``."""
+    system = flown.flight.systems[other]
+    return [record.time for record in read_tlog(flown.logs[k]) if sending_system(record.frame) == system]
+
+
+def test_nobody_hears_who_is_beyond(first: Flown) -> None:
+    samples = first.flight.truth.samples()
+    times = samples.time
+    silent = 0
+    for k in range(2):
+        for other in {0, 1} - {k}:
+            apart = np.linalg.norm(samples.position[:, k] - samples.position[:, other], axis=1)
+            arrivals = np.array(heard(first, k, other))
+            assert len(arrivals)
+            within = np.interp(arrivals, times, apart)
+            # Both fly at most 5 m/s per axis while a message is under way.
+            assert (within <= RANGE + 2.0 * np.sqrt(3.0) * 5.0 * 1e-6 * LATEST).all()
+            silent += int((apart > RANGE + 1.0).sum())
+    assert silent
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_the_same_seed_is_the_same_flight(reverse: bool, first: Flown, tmp_path: Path) -> None:
+    again = fly(OF, 5, tmp_path / "again", reverse_nodes=reverse)
+    assert facts(again) == facts(first)
+    assert logs(again) == logs(first)
+
+
+def test_only_one_process_has_all_places(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"links\.swarm\.range needs the places of all vehicles"):
+        Flight(OF, FIREFLY, 5, tmp_path, processes=2)
+    with pytest.raises(InputError, match="allowed in real time: null"):
+        RealTimeFlight(OF, FIREFLY, 5, tmp_path, tmp_path)
