@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from companion.avoidance.certified.box_planes import box_planes
 from companion.avoidance.certified.committed import controls
 from companion.config.obstacles import Box, Obstacle, Post, Sphere, Wall
+from companion.obstacles.boxes import boxes_of
 from companion.values.horizon import Array
 from mavlink_bridge.wire.plan import Integers, WirePlan
 from outrider.certify.evidence import Evidence, Order
@@ -133,7 +135,7 @@ def test_a_finding_is_what_dense_samples_show(
     least, step = sampled(points, known, _COUNT), longest(points) / (_COUNT - 1)
     if any(one.what == NEARER for one in verdict.findings):
         assert least < bound + step
-    elif bound > 1e-6:
+    else:
         assert least > bound - 2e-6
 
 
@@ -146,6 +148,46 @@ def test_who_began_nearer_may_not_come_nearer() -> None:
             plans.append(moved(rested(plans[-1]), metres))
         verdict = judged(flown(plans, [box(2.0)]))
         assert len(verdict.findings) == found, changes
+
+
+def test_who_began_inside_may_not_come_deeper() -> None:
+    """It stands 0.2 m deep in a box of 1 m; from where it has come out it may not return."""
+    begin = standing((1.7, 0.0, 5.0))
+    changes = ([], 0), ([-0.1], 0), ([0.1], 1), ([-0.5], 0), ([-0.5, 0.1], 1), ([1.5], 1), ([-0.1, 0.05], 1)
+    for moves, found in changes:
+        plans = [begin]
+        for metres in moves:
+            plans.append(moved(rested(plans[-1]), metres))
+        findings = judged(flown(plans, [box(2.0)])).findings
+        assert [one.what for one in findings] == [NEARER] * found, moves
+
+
+def test_who_began_round_a_corner_may_not_come_deeper() -> None:
+    """It turns back 0.05 m before a box; a control point is 0.05 m inside, so the bound is negative."""
+    begin = turned(standing((0.15, 0.0, 5.0)), [(10_000, 0, 0), (-20_000, 0, 0), (10_000, 0, 0)])
+    for made, found in ((on(begin), []), (turned(on(begin), [(-5_000, 0, 0), (-5_000, 0, 0)]), [NEARER])):
+        findings = judged(flown([begin, made], [box(1.0)])).findings
+        near = [one for one in findings if one.what == NEARER]
+        assert [one.what for one in near] == found
+        assert all("-0.250000 m, at least -0.050000 m" in one.figures for one in near)
+
+
+@given(
+    st.lists(st.tuples(*[st.floats(-1.5, 1.5)] * 3), min_size=3, max_size=3),
+    st.tuples(*[st.floats(0.1, 2.0)] * 3),
+    st.floats(-180.0, 180.0),
+)
+def test_a_bound_asks_no_more_of_a_plan_than_planes_of_boxes_keep(
+    triangle: list[tuple[float, ...]], size: tuple[float, float, float], yaw: float
+) -> None:
+    """Inside and outside: a plan that keeps min c·q_i of the committed one is no deeper than its bound."""
+    known = Box(kind="box", at=(0.0, 0.0, 0.0), size=size, yaw_deg=yaw)
+    own = np.array([triangle])
+    bound = Solids([known]).least(own, np.array([0]), 100.0).hull[0]
+    normals, least, _ = box_planes(own, boxes_of([known]), 100.0, 0.0)
+    (c,), cos, sin = normals[0], np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
+    along = np.abs([cos * c[0] + sin * c[1], cos * c[1] - sin * c[0], c[2]])
+    assert bound <= least[0, 0].min() - 0.5 * along @ size + 1e-9
 
 
 def test_after_an_anchor_the_bound_begins_anew() -> None:

@@ -3,8 +3,9 @@
 The bound of a vehicle and an obstacle is the required distance or, if the plan with which the vehicle began
 is nearer, the largest distance of a plan since then: plans keep min(present distance, required) on each
 segment. For the bound the distance of a plan is that of the hulls of its control points, which plans keep;
-the curve itself, which is checked against it, is never nearer. A vehicle begins at its first plan, after a
-farewell, at an anchor, and where a column becomes a plan in space.
+the curve itself, which is checked against it, is never nearer. Inside an obstacle distances are negative: a
+vehicle that began there, or close round a corner, has a negative bound, and may not come deeper. A vehicle
+begins at its first plan, after a farewell, at an anchor, and where a column becomes a plan in space.
 
 In a column that its autopilot climbs or descends, a vehicle has no planned height. The place of a landing is
 checked: from the plan's height down, no obstacle is nearer than required.
@@ -36,7 +37,10 @@ _REGION_M = 10.0
 
 
 class NearestObstacle(NamedTuple):
-    """Least distance (m) of a plan from a fixed obstacle, the vehicle, the time (µs) and the obstacle."""
+    """Least distance (m) of a plan from a fixed obstacle, the vehicle, the time (µs) and the obstacle.
+
+    Inside the obstacle the distance is negative.
+    """
 
     distance: float
     system: int
@@ -147,8 +151,7 @@ class _Vehicle:
     def _judge(self, row: int, here: NearestObstacle) -> None:
         """Compare the least distance of a plan from the obstacle of a row with the bound."""
         bound = self._bounds.get(row, self._terms.surface)
-        # A vehicle that began inside an obstacle has no bound until a plan is out of it.
-        if here.distance < bound - SLACK and bound > 0.0:
+        if here.distance < bound - SLACK:
             worst, count, _ = self._breaches.get(row, _Breach(here, 0, bound))
             self._breaches[row] = _Breach(min(worst, here), count + 1, bound)
 

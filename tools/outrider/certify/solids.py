@@ -1,9 +1,12 @@
 """Fixed obstacles as convex solids, and the least distance of Bézier curves from them.
 
-For a point p outside a convex solid let c be the unit vector from the solid's point nearest to p to p, and
-h(c) the largest c·x of the points x of the solid. A curve lies in the hull of its control points q_i, so it
-is at least min c·q_i − h(c) from the solid. Where this bound is below the least distance found at points of
-the curve so far, the curve is split in two (de Casteljau), and each half has a bound of its own.
+Distances are signed: inside a solid the distance is minus that from its surface. For a point p let c be the
+unit vector from the point of the surface nearest to p to p, inside a solid the opposite one, and h(c) the
+largest c·x of the points x of the solid. The distance of p is c·p − h(c), and no point q is nearer to the
+solid, or less deep in it, than c·q − h(c), because the solid is convex. A curve lies in the hull of its
+control points q_i, so its least distance is at least min c·q_i − h(c). Where this bound is below the least
+distance found at points of the curve so far, the curve is split in two (de Casteljau), and each half has a
+bound of its own.
 """
 
 from __future__ import annotations
@@ -25,14 +28,14 @@ TOLERANCE = 1e-7
 _MOST_SPLITS = 40
 _TINY = 1e-12
 _ROUNDING = 1e-9
-"""m by which a search along the axes is wider, and a distance up to which a point is inside a solid."""
+"""m by which a search along the axes is wider, and a distance from outside up to which a point is inside."""
 
 
 class Least(NamedTuple):
     """Least distances of a plan from K solids, m; infinite where it is further than was asked for.
 
-    ``distance`` (K,): 0 inside a solid; ``segment`` (K,) and ``share`` (K,), 0…1 of it: where that is.
-    ``hull`` (K,): a lower bound of the distance of the hulls of the control points; it may be negative.
+    ``distance`` (K,): negative inside a solid; ``segment`` (K,) and ``share`` (K,), 0…1 of it: where that is.
+    ``hull`` (K,): a lower bound of the distance of the hulls of the control points.
     """
 
     distance: Array
@@ -110,7 +113,7 @@ class Solids:
             if split == 0:
                 np.minimum.at(found.hull, k, lower)
             least = found.distance[k]
-            open_ = np.flatnonzero((lower < least - TOLERANCE) & (least > 0.0))
+            open_ = np.flatnonzero(lower < least - TOLERANCE)
             q, middle, k, segment, begin = q[open_], middle[open_], k[open_], segment[open_], begin[open_]
             first, last = 0.5 * (q[:, 0] + q[:, 1]), 0.5 * (q[:, 1] + q[:, 2])
             q = np.concatenate(
@@ -124,14 +127,15 @@ class Solids:
     def _bound(self, places: Array, q: Array, of: Rows) -> tuple[Array, Array]:
         """Return the distances (P,), m, of ``places`` (P, 3), and lower bounds (P,) of those of hulls.
 
-        The hulls are those of control points ``q`` (P, 3, 3). Inside a solid the bound is −∞.
+        The hulls are those of control points ``q`` (P, 3, 3). Both are signed.
         """
         off = places - self._nearest(places, of)
         distance = np.sqrt(np.vecdot(off, off))
         # The turn of a box and back leaves a rounding error inside it.
         outside = distance > _ROUNDING
-        distance = np.where(outside, distance, 0.0)
         c = off / np.where(outside, distance, 1.0)[:, None]
+        inside = np.flatnonzero(~outside)
+        distance[inside], c[inside] = self._depth(places[inside], of[inside])
         along = self._turned(c, of)
         across = np.sqrt(np.vecdot(c[:, :2], c[:, :2]))
         radius = self._half[of, 0]
@@ -139,7 +143,30 @@ class Solids:
         reach = np.where(self._post[of], radius * across, radius)
         reach = np.where(self._box[of], np.vecdot(np.abs(along), self._half[of]), reach)
         bound = np.vecdot(q - self._at[of][:, None], c[:, None]).min(axis=1) - reach
-        return distance, np.where(outside, bound, -np.inf)
+        return distance, bound
+
+    def _depth(self, places: Array, of: Rows) -> tuple[Array, Array]:
+        """Return the distances (P,) ≤ 0, m, of ``places`` (P, 3) inside, and the directions out (P, 3).
+
+        The latter are unit vectors; that of a post points to its side or to its top.
+        """
+        off, box, post = places - self._at[of], self._box[of], self._post[of]
+        along = self._turned(off, of)
+        beyond = np.abs(along) - self._half[of]
+        face = beyond.argmax(axis=1)
+        each = np.arange(len(of))
+        flat = np.zeros(off.shape)
+        flat[each, face] = np.where(along[each, face] < 0.0, -1.0, 1.0)
+        distance = beyond[each, face]
+        off[post, 2] = 0.0
+        length = np.sqrt(np.vecdot(off, off))
+        ball = off / np.where(length > _TINY, length, 1.0)[:, None]
+        ball[length <= _TINY] = 1.0, 0.0, 0.0
+        beside, above = length - self._half[of, 0], places[:, 2] - self._at[of, 2]
+        ball[post & (above > beside)] = 0.0, 0.0, 1.0
+        round_ = np.where(post, np.maximum(beside, above), beside)
+        ways = np.where(box[:, None], self._turned(flat, of, back=True), ball)
+        return np.where(box, distance, round_), ways
 
     def _nearest(self, points: Array, of: Rows) -> Array:
         """Return the points (P, 3) of the solids ``of`` (P,) that are nearest to ``points`` (P, 3), m."""
