@@ -255,7 +255,9 @@ class World:
         if link == "swarm":
             self.cameras.forwarded(now, message, lambda stamp: self.neighbours.when(system, now, stamp))
         else:
-            self.cameras.own(now, message, lambda stamp: self._own.dated(now, stamp), self._own.at(now))
+            self.cameras.own(
+                now, message, lambda stamp: self._own.dated(now, stamp), lambda: self._own.at(now)
+            )
 
     def _receive_distances(self, now: int, message: ObstacleDistance) -> None:
         """Process an OBSTACLE_DISTANCE of the own system, with the vehicle's pose at measurement time."""

@@ -71,6 +71,9 @@ class OwnErrors(Settings):
     sigma_white: float = Field(0.03, ge=0.0, le=10.0, description="m, of each position; not in common")
 
 
+_GNSS_ERRORS = OwnErrors()
+
+
 class FusedSource(Settings):
     """Detections of the own camera and of the neighbours', fused."""
 
@@ -127,7 +130,7 @@ class FusedSource(Settings):
     @property
     def errors(self) -> OwnErrors:
         """Errors of the vehicles' own estimates."""
-        return OwnErrors() if self.own_errors is None else self.own_errors
+        return _GNSS_ERRORS if self.own_errors is None else self.own_errors
 
 
 TargetSource = Annotated[

@@ -16,7 +16,6 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.config.target_source import FusedSource
 from companion.estimation.fused_target import FusedTarget
 from companion.estimation.tracks import State
-from companion.values.horizon import Array
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo, CameraTrackingImage, Source
 from mavlink_bridge.pinhole import Extent, Pinhole, sighting
@@ -40,12 +39,16 @@ class CameraLinks:
         self._stamps: dict[Source, deque[int]] = {}
 
     def own(
-        self, now: int, message: CameraMessage, when: Callable[[int], int | None], vehicle: State | None
+        self,
+        now: int,
+        message: CameraMessage,
+        when: Callable[[int], int | None],
+        vehicle: Callable[[], State | None],
     ) -> None:
         """Receive a message of the own camera at ``now`` (µs).
 
         ``when`` converts a stamp of the autopilot's clock to a time (µs), and returns None for one from the
-        future; ``vehicle``: own state at ``now``.
+        future; ``vehicle`` returns the own state at ``now``.
         """
         if isinstance(message, CameraFovStatus):
             self._views[message.source] = now, message
@@ -64,8 +67,8 @@ class CameraLinks:
                 self._target.drop()
                 return
             time = taken
-        elif vehicle is not None:
-            place = vehicle.position - 1e-6 * (now - time) * vehicle.velocity
+        elif (own := vehicle()) is not None:
+            place = own.position - 1e-6 * (now - time) * own.velocity
             view = CameraFovStatus(
                 message.source, 0, self._fleet.to_geodetic(place), None, _FORWARD, 0.0, 0.0
             )
@@ -98,9 +101,9 @@ class CameraLinks:
         return view if received == now else None
 
     def _give(self, now: int, time: int, view: CameraFovStatus | None, message: CameraTrackingGeo) -> None:
-        camera: Array | None = None
+        camera = None
         if view is not None and view.place is not None:
-            camera = np.array(self._fleet.to_east_north_up(*view.place))
+            camera = self._fleet.to_east_north_up(*view.place)
         self._target.receive(now, time, camera, view, message)
 
     def _projected(self, view: CameraFovStatus, message: CameraTrackingImage) -> CameraTrackingGeo | None:

@@ -8,20 +8,22 @@ the vertical one v; with the elevation β of the ray σ_along = σ_s cos β and 
 
 from __future__ import annotations
 
-from math import hypot, inf, radians
+from math import hypot, inf, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from companion.config.target_source import FusedSource
-from companion.estimation.fusion_filter import FIELDS
 from companion.values.horizon import Array
+from mavlink_bridge.frames import Point
 from mavlink_bridge.messages import CameraTrackingGeo
 
 _MAX_SIGMA_M, _MAX_BEARING_RAD, _MAX_DISTANCE_M = 100.0, 0.5, 2000.0
 """Accuracies and distances beyond these are absurd."""
 _MIN_SIGMA_M = 0.01
 """No camera is believed to be more accurate (m)."""
+_MIN_LEVEL = 1e-6
+"""Cosine of a ray's elevation below which the ray counts as vertical."""
 
 
 class Detection(NamedTuple):
@@ -41,36 +43,43 @@ class Detection(NamedTuple):
 
 
 def detection(
-    config: FusedSource, vehicle: int, time: int, place: Array, camera: Array, message: CameraTrackingGeo
+    config: FusedSource, vehicle: int, time: int, place: Point, camera: Point, message: CameraTrackingGeo
 ) -> Detection | None:
-    """Return the detection in ``message`` of a camera at ``camera`` (3,); ``place`` (3,): the target's, m.
+    """Return the detection in ``message`` of a camera at ``camera``; ``place``: the target's. Both ENU, m.
 
-    Returns None for one whose accuracies or distance are absurd.
+    Returns None for one whose accuracies or distance are absurd. Every detection that is received passes
+    here; for three numbers floats are ten times as fast as NumPy.
     """
-    ray = place - camera
-    distance = float(np.sqrt(ray @ ray))
+    x, y, z = place[0] - camera[0], place[1] - camera[1], place[2] - camera[2]
+    distance = sqrt(x * x + y * y + z * z)
+    # Within these limits the places are finite.
     if not 1e-3 < distance <= _MAX_DISTANCE_M:
         return None
-    across, along = _accuracies(config, distance, hypot(ray[0], ray[1]), message)
+    across, along = _accuracies(config, distance, hypot(x, y), message)
     if not (0.0 < across <= _MAX_SIGMA_M and 0.0 < along <= _MAX_SIGMA_M):
         return None
-    errors = config.errors
-    ray = ray / distance
-    level = hypot(ray[0], ray[1])
+    x, y, z = x / distance, y / distance, z / distance
+    level = hypot(x, y)
     # Straight below the camera the yaw moves nothing.
-    left = np.array([-ray[1], ray[0], 0.0])
-    up = np.cross(ray, left / level) if level > 1e-6 else np.array([1.0, 0.0, 0.0])
-    white = errors.sigma_white**2
-    covariance = across**2 * np.eye(3) + (along**2 - across**2) * np.outer(ray, ray)
-    fields = np.concatenate([place, covariance.ravel(), left, up, camera, [distance]])
-    estimate = message.velocity_ned is not None
-    if fields.shape != (FIELDS,) or not np.isfinite(fields).all():
-        return None
-    common = errors.sigma_horizontal**2 + (radians(errors.sigma_yaw_deg) * distance * level) ** 2
-    sideways = across**2 + white + common
-    lengthways = (along * level) ** 2 + white + errors.sigma_horizontal**2
+    up = (-z * x / level, -z * y / level, level) if level > _MIN_LEVEL else (1.0, 0.0, 0.0)
+    wide, longer = across * across, along * along - across * across
+    xy, xz, yz = longer * x * y, longer * x * z, longer * y * z
+    fields = np.array(
+        (
+            *place,
+            *(wide + longer * x * x, xy, xz, xy, wide + longer * y * y, yz, xz, yz, wide + longer * z * z),
+            *(-y, x, 0.0),
+            *up,
+            *camera,
+            distance,
+        )
+    )
+    errors = config.errors
+    white, common = errors.sigma_white**2, errors.sigma_horizontal**2
+    sideways = wide + white + common + (radians(errors.sigma_yaw_deg) * distance * level) ** 2
+    lengthways = (along * level) ** 2 + white + common
     weight = 0.5 * (1.0 / sideways - 1.0 / lengthways)
-    return Detection(vehicle, time, fields, estimate, weight, message)
+    return Detection(vehicle, time, fields, message.velocity_ned is not None, weight, message)
 
 
 def _accuracies(
@@ -94,4 +103,4 @@ def _accuracies(
     if heading is None:
         across = max(min(across, horizontal, vertical), _MIN_SIGMA_M)
     square = horizontal**2 + vertical**2 - 2.0 * across**2
-    return across, max(float(np.sqrt(max(square, 0.0))), across)
+    return across, max(sqrt(max(square, 0.0)), across)

@@ -6,28 +6,29 @@ from the future; others are counted and dropped.
 
 from __future__ import annotations
 
-from math import isfinite
 from types import MappingProxyType
 from typing import NamedTuple
 
-import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.config.target_source import FusedSource
 from companion.estimation.detections import Detection, detection
-from companion.estimation.fusion import Fusion
+from companion.estimation.fusion import Belief, Fusion
 from companion.estimation.fusion_filter import worst_sigma
 from companion.estimation.fusion_log import Counts, FusionLog, FusionTally
 from companion.estimation.tracks import State
 from companion.values.horizon import Array
 from companion.values.mates import Sight
-from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.frames import FleetFrame, Point
 from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo
 
 _MAX_DISTANCE_M = 1e5
 _RECENT_US, _SEEN_US = 2_000_000, 500_000
 """Time (µs) over which the cameras' weights are measured, and in which a detection counts as seeing now."""
+
+
+_NOTHING_ASKED = None, None
 
 
 class Outgoing(NamedTuple):
@@ -53,6 +54,7 @@ class FusedTarget:
         self._next = 0
         self._sent = 0
         self._log = FusionLog()
+        self._last: tuple[int | None, Belief | None] = _NOTHING_ASKED
 
     @property
     def counts(self) -> Counts:
@@ -74,7 +76,7 @@ class FusedTarget:
         """Add a row to the log if one is due at ``now`` (µs)."""
         if not self._log.due(now):
             return
-        known = self._fusion.at(now, self._config.target.extrapolate_us)
+        known = self._known(now)
         if known is not None:
             seen_by = len(self._fusion.recent(now - _SEEN_US - self._source.latency_us))
             self._log.add(now, known.position, known.covariance, seen_by)
@@ -92,11 +94,11 @@ class FusedTarget:
         self,
         now: int,
         time: int,
-        camera: Array | None,
+        camera: Point | None,
         view: CameraFovStatus | None,
         message: CameraTrackingGeo,
     ) -> bool:
-        """Receive a detection of an image taken at ``time`` (µs) by a camera at ``camera`` (3,), m.
+        """Receive a detection of an image taken at ``time`` (µs) by a camera at ``camera`` (ENU, m).
 
         ``view``: of the same image. Return whether the detection counts.
         """
@@ -104,6 +106,7 @@ class FusedTarget:
         if found is None:
             self._invalid += 1
             return False
+        self._last = _NOTHING_ASKED
         if not self._fusion.put(found):
             return False
         if message.source.system != self._system:
@@ -131,7 +134,7 @@ class FusedTarget:
 
     def last(self, now: int) -> State | None:
         """Return the last known state at ``now`` (µs), however old; None before the first detection."""
-        known = self._fusion.at(now, self._config.target.extrapolate_us)
+        known = self._known(now)
         if known is None:
             return None
         return State(known.position, known.velocity, now - known.time, worst_sigma(known.covariance))
@@ -148,7 +151,7 @@ class FusedTarget:
 
     def covariance(self, now: int) -> Array | None:
         """Return the covariance (3, 3) of the target's position at ``now`` (µs); None before the first."""
-        known = self._fusion.at(now, self._config.target.extrapolate_us)
+        known = self._known(now)
         return None if known is None else known.covariance
 
     def sight(self, now: int, ahead: float) -> Sight:
@@ -157,28 +160,42 @@ class FusedTarget:
         if not recent:
             return Sight()
         weights = {}
-        for system, found in recent.items():
+        for system, seen in recent.items():
             # Messages of neighbours are lost, none of the own: a camera is compared with others.
-            others = [len(one) for other, one in recent.items() if other not in (system, self._system)]
-            seen = min(1.0, len(found) / max(_ENOUGH * max(others, default=0), 1.0))
-            weights[system] = seen * sum(found) / len(found)
-        covariance = self.covariance(now + round(1e6 * ahead))
+            others = [one.number for other, one in recent.items() if other not in (system, self._system)]
+            share = min(1.0, seen.number / max(_ENOUGH * max(others, default=0), 1.0))
+            weights[system] = share * seen.weight
+        known = self._known(now + round(1e6 * ahead))
         prior = 0j
-        if covariance is not None:
-            information = np.linalg.inv(covariance[:2, :2])
+        if known is not None:
+            (a, b, _), (_, d, _), _ = known.covariance.tolist()
             # −½(λ₁ − λ₂) e^{2iφ₁} of the information in the plane.
-            prior = -complex(0.5 * (information[0, 0] - information[1, 1]), information[0, 1])
+            prior = complex(0.5 * (a - d), b) / (a * d - b * b)
         return Sight(MappingProxyType(weights), prior)
 
-    def _detection(self, time: int, camera: Array | None, message: CameraTrackingGeo) -> Detection | None:
+    def _known(self, time: int) -> Belief | None:
+        """Return what is known at ``time`` (µs); None before the first detection.
+
+        In one step several parts ask for the same time.
+        """
+        asked, found = self._last
+        if asked != time:
+            found = self._fusion.at(time, self._config.target.extrapolate_us)
+            self._last = time, found
+        return found
+
+    def _detection(self, time: int, camera: Point | None, message: CameraTrackingGeo) -> Detection | None:
         source = self._source
-        tracks = message.status == mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE
-        other = source.device is not None and message.device != source.device
         system = message.source.system
-        strange = bool(source.vehicles) and system not in source.vehicles and system != self._system
-        if camera is None or not tracks or other or strange:
+        if camera is None or message.status != mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE:
             return None
-        place = np.array(self._fleet.to_east_north_up(message.latitude, message.longitude, message.altitude))
-        if not (isfinite(float(place.sum())) and float(place @ place) <= _MAX_DISTANCE_M**2):
+        if source.device is not None and message.device != source.device:
+            return None
+        if source.vehicles and system not in source.vehicles and system != self._system:
+            return None
+        place = self._fleet.to_east_north_up(message.latitude, message.longitude, message.altitude)
+        east, north, up = place
+        # NaN is not near either.
+        if not east * east + north * north + up * up <= _MAX_DISTANCE_M**2:
             return None
         return detection(source, system, time, place, camera, message)

@@ -53,6 +53,13 @@ class Belief(NamedTuple):
     covariance: Array
 
 
+class Seen(NamedTuple):
+    """Number of a vehicle's detections, and the mean of their w_k (1/m²)."""
+
+    number: int
+    weight: float
+
+
 class Fusion:
     """Filter of all detections; times are the companion's own, in µs.
 
@@ -72,6 +79,9 @@ class Fusion:
         self._data = np.zeros((_CAPACITY, FIELDS))
         self._used = np.zeros(_CAPACITY, dtype=bool)
         self._nis = np.zeros(_CAPACITY)
+        self._vehicles = np.zeros(_CAPACITY, dtype=np.int64)
+        self._weights = np.zeros(_CAPACITY)
+        self._newest = 0
         self._began: int | None = None
         self._passed: int | None = None
         self._x0, self._P0, self._memory0 = np.zeros(TARGET), np.zeros((TARGET, TARGET)), np.zeros(ADAPTED)
@@ -81,14 +91,15 @@ class Fusion:
 
     def put(self, detection: Detection) -> bool:
         """Add a detection; return False if it is older than the window."""
-        if self._began is not None and detection.time < self._latest - self._window:
+        if self._began is None:
+            self._began = self._newest = detection.time
+            self._start(detection)
+        elif detection.time < self._newest - self._window:
             self.late += 1
             return False
-        if self._began is None:
-            self._began = detection.time
-            self._start(detection)
         elif not self._detections and not self._pending:
             self._began = min(self._began, detection.time)
+        self._newest = max(self._newest, detection.time)
         self._pending.append(detection)
         return True
 
@@ -127,16 +138,20 @@ class Fusion:
         ahead(1e-6 * elapsed, 1e-6 * min(elapsed, longest), x, P, memory, self._noise, state, covariance)
         return Belief(passed, state[:3], state[3:], covariance)
 
-    def recent(self, since: int) -> dict[int, list[float]]:
-        """Return w_k of the detections of images from ``since`` (µs) on that passed, by vehicle."""
+    def recent(self, since: int) -> dict[int, Seen]:
+        """Return the detections of images from ``since`` (µs) on that passed, by vehicle."""
         self._process()
-        found: dict[int, list[float]] = {}
-        first = int(np.searchsorted(self._times[: len(self._detections)], since))
-        for row in range(first, len(self._detections)):
-            if self._used[row]:
-                one = self._detections[row]
-                found.setdefault(one.vehicle, []).append(one.weight)
-        return found
+        count = len(self._detections)
+        rows = slice(int(self._times[:count].searchsorted(since)), count)
+        used = self._used[rows]
+        vehicles = self._vehicles[rows][used]
+        numbers = np.bincount(vehicles)
+        sums = np.bincount(vehicles, self._weights[rows][used])
+        return {
+            system: Seen(number, total / number)
+            for system, (number, total) in enumerate(zip(numbers.tolist(), sums.tolist(), strict=True))
+            if number
+        }
 
     @property
     def innovations(self) -> Array:
@@ -144,13 +159,6 @@ class Fusion:
         self._process()
         count = len(self._detections)
         return self._nis[:count][self._used[:count]].copy()
-
-    @property
-    def _latest(self) -> int:
-        times = [one.time for one in self._pending]
-        if self._detections:
-            times.append(int(self._times[len(self._detections) - 1]))
-        return max(times, default=-(1 << 62))
 
     def _start(self, first: Detection) -> None:
         """Begin with nothing known but that the target is about where ``first`` places it."""
@@ -204,10 +212,11 @@ class Fusion:
             self._x0, self._P0, self._memory0, self._noise,
             self._states, self._covariances, self._memories, self._used, self._nis,
         )  # fmt: skip
-        passed = np.flatnonzero(self._used[:count])
-        if len(passed):
-            self._passed = int(self._times[passed[-1]])
-        self._restart_if_wrong()
+        last = count - 1 - int(self._used[count - 1 :: -1].argmax())
+        if self._used[last]:
+            self._passed = self._detections[last].time
+        if not self._used[last] or self._detections[-1].time - self._detections[last].time > _RESTART_US:
+            self._restart_if_wrong()
         self._forget()
 
     def _insert(self, one: Detection) -> int:
@@ -215,19 +224,22 @@ class Fusion:
         if len(self._detections) == _CAPACITY:
             self._drop(_CAPACITY // 2)
         count = len(self._detections)
-        place = bisect_right(self._detections, _order(one), key=_order)
-        for column in (self._times, self._rows, self._data):
-            column[place + 1 : count + 1] = column[place:count].copy()
+        place = count
+        if count and _order(one) < _order(self._detections[-1]):
+            place = bisect_right(self._detections, _order(one), key=_order)
+            for column in (self._times, self._rows, self._data, self._vehicles, self._weights):
+                column[place + 1 : count + 1] = column[place:count].copy()
         self._detections.insert(place, one)
         self._times[place] = one.time
         self._rows[place] = -1 if one.estimate else self._slots[one.vehicle]
         self._data[place] = one.fields
+        self._vehicles[place], self._weights[place] = one.vehicle, one.weight
         return place
 
     def _forget(self) -> None:
         """Drop what is older than the window once it is twice as much: nothing is inserted there any more."""
         count = len(self._detections)
-        if count and self._times[0] < self._times[count - 1] - _WINDOW_SHARE * self._window:
+        if count and self._detections[0].time < self._detections[-1].time - _WINDOW_SHARE * self._window:
             old = int(np.searchsorted(self._times[:count], self._times[count - 1] - self._window))
             self._drop(min(old, count - 1))
 
@@ -241,20 +253,18 @@ class Fusion:
         self._began = int(self._times[old - 1])
         self._x0, self._P0 = self._states[old - 1].copy(), self._covariances[old - 1].copy()
         self._memory0 = self._memories[old - 1].copy()
-        for column in (self._times, self._rows, self._data, self._states, self._covariances, self._memories):
-            column[: count - old] = column[old:count].copy()
-        for flags in (self._used, self._nis):
-            flags[: count - old] = flags[old:count].copy()
+        short = self._times, self._rows, self._data, self._vehicles, self._weights, self._used, self._nis
+        for column in (*short, self._states, self._covariances, self._memories):
+            # In parts that do not overlap: a copy of all covariances would take a millisecond.
+            for begin in range(0, count - old, old):
+                end = min(begin + old, count - old)
+                column[begin:end] = column[begin + old : end + old]
         del self._detections[:old]
 
     def _restart_if_wrong(self) -> None:
-        """Begin anew with refused detections that agree, if nothing has passed for a while."""
-        count = len(self._detections)
-        last = int(self._times[count - 1])
-        recent = range(int(np.searchsorted(self._times[:count], last - _RESTART_US)), count)
-        if any(self._used[row] for row in recent):
-            return
-        one = self._detections[count - 1]
+        """Begin anew with detections that agree, where all of the last ``_RESTART_US`` are refused."""
+        count, one = len(self._detections), self._detections[-1]
+        recent = range(int(np.searchsorted(self._times[:count], one.time - _RESTART_US)), count)
         agreeing = [row for row in recent if self._agree(self._detections[row], one)]
         if len(agreeing) < _WITNESSES:
             return

@@ -172,3 +172,23 @@ def test_a_camera_that_tells_the_place_in_the_image_is_projected():
     assert of.target.last(now).position == pytest.approx(PLACE, abs=0.05)
     give(of, now, "autopilot", (looking, said._replace(rectangle=None)))
     assert of.target.counts.invalid == 1
+
+
+def test_a_step_asks_the_filter_once_and_again_after_a_detection(monkeypatch):
+    """A plan, the log, the status and the metrics ask for the same time."""
+    of, now = started()
+    give(of, now, "autopilot", own_detection(now - START - 150_000))
+    asked, fusion = [], of.target._fusion
+    answer = fusion.at
+    monkeypatch.setattr(fusion, "at", lambda time, longest: asked.append(time) or answer(time, longest))
+    before = of.at(now).target
+    of.target.record(now)
+    of.target.at(now), of.target.covariance(now), of.target.age(now)
+    assert asked == [now]
+    # Between the last two: what is known at ``now`` has changed.
+    give(of, now, "swarm", forwarded(now - START - 60_000, PLACE + 0.1))
+    after = of.target.last(now)
+    assert asked == [now, now]
+    assert np.linalg.norm(after.position - before.position) > 0.01
+    of.target.last(now + 1)
+    assert asked == [now, now, now + 1]

@@ -3,11 +3,11 @@ sender can do."""
 
 from __future__ import annotations
 
-from math import sqrt
+from math import radians, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
@@ -15,7 +15,16 @@ from companion.config.target_source import FusedSource, OwnErrors
 from companion.estimation.detections import Detection, detection
 from companion.estimation.fusion import Fusion
 from companion.estimation.fusion_filter import ADAPTED, FIELDS, MARKS, NOISE, PER_VEHICLE, TARGET, replay
-from tests.companion.estimation.cameras import START, Vehicle, Walker, message, singer, source_of
+from tests.companion.estimation.cameras import (
+    ACROSS_DEG,
+    ALONG,
+    START,
+    Vehicle,
+    Walker,
+    message,
+    singer,
+    source_of,
+)
 
 WINDOW = 2_000_000
 STEP = 100_000
@@ -305,6 +314,46 @@ def test_absurd_accuracies_are_no_detection(changes):
     assert detection(source_of("rtk"), 11, START, place, camera, good) is not None
     assert detection(source_of("rtk"), 11, START, place, camera, good._replace(**changes)) is None
     assert detection(source_of("rtk"), 11, START, place, place, good) is None
+
+
+@given(st.tuples(*[st.floats(-50.0, 50.0)] * 3), st.tuples(*[st.floats(-20.0, 20.0)] * 3))
+@settings(max_examples=60)
+def test_a_detection_has_the_covariance_of_its_camera_and_the_directions_of_its_errors(place, offset):
+    """R has σ² along the ray, and twice across; yaw and elevation move the place to the left and up."""
+    camera = np.add(place, offset)
+    ray = np.subtract(place, camera)
+    distance = float(np.linalg.norm(ray))
+    # Nearer ones are at the least σ that is believed.
+    assume(distance > 5.0 and np.hypot(ray[0], ray[1]) > 0.01)
+    found = detection(source_of("rtk"), 11, START, place, tuple(camera), message(11, np.array(place), camera))
+    assert found is not None
+    fields, ray = found.fields, ray / distance
+    across = radians(ACROSS_DEG) * distance
+    along = ALONG * distance
+    R = across**2 * np.eye(3) + (along**2 - across**2) * np.outer(ray, ray)
+    np.testing.assert_allclose(fields[3:12].reshape(3, 3), R, rtol=1e-6, atol=1e-9 * distance**2)
+    left, up = fields[12:15], fields[15:18]
+    np.testing.assert_allclose(left, np.cross((0.0, 0.0, 1.0), ray), atol=1e-12)
+    np.testing.assert_allclose(np.cross(ray, left), np.linalg.norm(left) * up, atol=1e-12)
+    np.testing.assert_array_equal(fields[:3], place)
+    np.testing.assert_array_equal(fields[18:21], camera)
+    assert fields.shape == (FIELDS,)
+    assert fields[21] == pytest.approx(distance, rel=1e-14)
+
+
+def test_what_was_seen_recently_is_counted_by_vehicle_with_its_mean_weight():
+    source, found, _ = flight("rtk", 6, 1.9)
+    found[25] = found[25]._replace(fields=np.concatenate([[40.0, 0.0, 0.0], found[25].fields[3:]]))
+    fusion, since = fused(source, found[::-1]), found[0].time + 500_000
+    used = [one for one in found if one is not found[25] and one.time >= since]
+    seen = fusion.recent(since)
+    assert set(seen) == {11, 12, 13}
+    assert fusion.refused == 1
+    for vehicle, (number, weight) in seen.items():
+        weights = [one.weight for one in used if one.vehicle == vehicle]
+        assert number == len(weights)
+        assert weight == pytest.approx(np.mean(weights), rel=1e-12)
+    assert fusion.recent(found[-1].time + 1) == {}
 
 
 def test_a_kernel_of_no_vehicle_and_no_detection_does_nothing():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from outrider.bench import stages, start
+from outrider.bench import fusion, stages, start
 from outrider.bench.comparison import earlier, ratios
 from outrider.bench.receive import receiving
 from outrider.errors import InputError
@@ -27,6 +27,15 @@ def test_receiving_is_timed_for_positions_and_plans() -> None:
     found = receiving(1)
     assert set(found) == {"position", "plan"}
     assert all(0.0 < times["converted"] < times["whole"] for times in found.values())
+
+
+def test_the_fusion_is_measured_with_detections_that_are_all_used() -> None:
+    found = fusion.figures(1, plan_ms=0.2)
+    parts = [found[name] for name in fusion.Costs._fields]
+    assert all(part > 0.0 for part in parts)
+    assert found["all"] == pytest.approx(sum(parts), abs=0.3)
+    assert found["share_of_plan"] == pytest.approx(found["all"] / 200.0, abs=1e-3)
+    assert found["share_of_period"] == pytest.approx(found["all"] / 50_000.0, abs=1e-5)
 
 
 def test_figures_of_both_benchmarks_are_compared(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from mavlink_bridge.messages import GlobalPosition, Source
 from mavlink_bridge.wire.codec import Codec
 from outrider.bench import certified as bench_certified
 from outrider.bench import field as bench_field
+from outrider.bench import fusion as bench_fusion
 from outrider.bench import receive as bench_receive
 from outrider.bench import stages, start
 from outrider.bench import tlog as bench_tlog
@@ -60,6 +61,7 @@ def measure(progress: Progress, *, quick: bool) -> dict[str, object]:
     progress("codec and tlog", 0.4)
     figures["codec_us"] = codec(rounds)
     figures["receive_us"] = bench_receive.receiving(rounds)
+    figures["fusion_us"] = bench_fusion.figures(rounds, float(np.median(steps)))
     figures.update(bench_tlog.reading(rounds))
     if not quick:
         progress("antipodal-8 at 100 Hz", 0.5)
