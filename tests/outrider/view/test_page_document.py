@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from outrider.scene.airframe import HEXAROTOR
-from outrider.view import camera
+from outrider.view import camera, shapes
 from outrider.view.bodies import blade_poses
 from outrider.view.page_document import live_page, recorded_page
 
@@ -53,12 +53,23 @@ def test_the_scene_is_in_the_picture_and_fills_it(reach: float, field: float, as
     assert 0.9 < share <= 1.0
 
 
-@given(st.floats(1.0, 200.0), st.floats(0.3, 3.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
-def test_from_above_height_hardly_shifts_a_vehicle(reach: float, aspect: float, x: float, up: float) -> None:
+@given(st.floats(4.0, 200.0), st.floats(0.3, 3.0), st.floats(-1.0, 1.0), st.floats(1.0, 4.0))
+def test_from_above_height_hardly_shifts_a_vehicle(
+    reach: float, aspect: float, up: float, zoom: float
+) -> None:
+    """Also in a picture that is enlarged: less than 1 % of the distance from the middle."""
     away = camera.distance(reach, camera.TOP_FIELD, aspect)
-    height = 0.1 * reach * up
-    seen = x * reach * away / (away - height)
-    assert abs(seen - x * reach) <= 1e-3 * reach
+    height = reach * up
+    assert abs(away / (away - height) - 1.0) <= 2e-3
+    assert abs(away / (away - zoom * height) - 1.0) <= 1e-2
+
+
+@given(st.floats(4.0, 500.0))
+def test_the_first_labelled_line_of_the_ground_is_in_the_scene(reach: float) -> None:
+    cell, section = shapes.ground_lines(reach)
+    assert 3.0 * cell <= reach * (1.0 + 1e-9)
+    assert 0.1 * reach < section <= reach
+    assert section / cell == pytest.approx(round(section / cell))
 
 
 @pytest.mark.parametrize("time", [0.0, 0.3, 7.0])

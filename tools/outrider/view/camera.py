@@ -16,9 +16,11 @@ Array = NDArray[np.floating]
 
 AZIMUTH, ELEVATION, FIELD = -1.15, 0.5, float(np.radians(40.0))
 """Direction of the whole scene, as in the report, and the vertical field of view (rad)."""
-TOP_FIELD = float(np.radians(1.0))
-"""Vertical field of view (rad) from above: so narrow that a height of a tenth of the scene's reach shifts a
-vehicle by less than 0.1 % of it. Viser has no camera without perspective."""
+TOP_FIELD = float(np.radians(0.2))
+"""Vertical field of view (rad) from above: so narrow that a height as large as the scene's reach shifts a
+vehicle by less than 0.2 % of its distance from the middle. Viser 1 has cameras with perspective only."""
+_TOP_NEAR = 0.1
+"""Nearest depth from above, as a share of the camera's distance: the picture can be enlarged ten times."""
 _ROOM = 1.05
 _SHARE = 0.15
 """Part of the way to the vehicles that the middle of the picture moves for one snapshot."""
@@ -62,7 +64,7 @@ def _aim(
     far = float(np.linalg.norm(place))
     camera.fov = field
     # A narrow field is seen from far away: the depths that can be told apart begin near the scene.
-    camera.near = max(0.01, 0.5 * far) if field == TOP_FIELD else 0.01
+    camera.near = max(0.01, _TOP_NEAR * far) if field == TOP_FIELD else 0.01
     camera.far = far + 100.0 * reach
     # In this order: a new position takes the point that is looked at with it.
     camera.position = place

@@ -251,8 +251,8 @@ class Panel:
         if scene.step_s is not None:
             known["planes"] = "Separating planes"
         with gui.add_folder("Show", expand_by_default=False):
-            cell = self._stage.cell
-            gui.add_markdown(f"Lines on the ground: {cell:g} m apart, thick ones {5.0 * cell:g} m.")
+            cell, section = self._stage.cell, self._stage.section
+            gui.add_markdown(f"Lines on the ground: {cell:g} m apart, thick ones {section:g} m.")
             for name, label in known.items():
                 self._add_layer(name, label)
 

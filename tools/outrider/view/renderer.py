@@ -124,7 +124,12 @@ class Renderer:
     @property
     def cell(self) -> float:
         """Distance (m) between two thin lines of the ground."""
-        return float(10.0 ** np.floor(np.log10(self.scene.reach / 3.0)))
+        return shapes.ground_lines(self.scene.reach)[0]
+
+    @property
+    def section(self) -> float:
+        """Distance (m) between two thick lines of the ground, which have labels."""
+        return shapes.ground_lines(self.scene.reach)[1]
 
     @property
     def layers(self) -> Layers:
@@ -223,7 +228,7 @@ class Renderer:
             f"{WORLD}/ground",
             infinite_grid=True,
             cell_size=cell,
-            section_size=5.0 * cell,
+            section_size=self.section,
             cell_color=GRID,
             section_color=LINE,
             cell_thickness=0.8,
@@ -232,7 +237,7 @@ class Renderer:
             shadow_opacity=0.0,
         )
         for n in (k for k in range(-_SCALE_LABELS, _SCALE_LABELS + 1) if k):
-            away = 5.0 * cell * n
+            away = self.section * n
             for axis, place in (("E", (away, 0.0, 0.0)), ("N", (0.0, away, 0.0))):
                 self._stage.add_label(
                     f"{WORLD}/scale-{axis}{n}",

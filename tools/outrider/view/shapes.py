@@ -190,3 +190,9 @@ def tile() -> Mesh:
     here = np.arange(count)
     faces = np.stack([np.zeros(count, dtype=np.int64), here + 1, (here + 1) % count + 1], axis=1)
     return Mesh(vertices, faces)
+
+
+def ground_lines(reach: float) -> tuple[float, float]:
+    """Return the distances (m) between thin and between thick lines; a thick one is within ``reach`` (m)."""
+    cell = float(10.0 ** np.floor(np.log10(reach / 3.0)))
+    return cell, cell * (5.0 if reach >= 7.0 * cell else 2.0)
