@@ -130,10 +130,10 @@ def css(dark: bool) -> str:
     return " ".join(f"--{name}: {value};" for name, value in named.items())
 
 
-BODY, SOFT, LINE, GRID, BAD, ACCENT, SOLID = map(
-    rgb, ("#6b7680", BYSTANDER, "#8c959d", "#b0b7be", "#d9483b", "#3f7fd0", OBSTACLE)
+BODY, SOFT, GRID, BAD, ACCENT, SOLID = map(
+    rgb, ("#6b7680", BYSTANDER, "#7a8086", "#d9483b", "#3f7fd0", OBSTACLE)
 )
-"""Colours of the view, whose ground is white or nearly black."""
+"""Colours of the view, whose ground is white or nearly black. The ground's lines are as plain on both."""
 
 
 def coloured(draw: Callable[_P, _R]) -> Callable[_P, _R]:

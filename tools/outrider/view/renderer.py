@@ -8,7 +8,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from outrider.palette import ACCENT, GRID, LINE, RGB, SOFT, SOLID, TARGET, colours, linear, rgb
+from outrider.palette import ACCENT, GRID, RGB, SOFT, SOLID, TARGET, colours, linear, rgb
 from outrider.scene.camera_view import field_lines, rays
 from outrider.scene.planes import MOST, Plane, between, facing
 from outrider.scene.scene import Scene, Solid
@@ -230,9 +230,9 @@ class Renderer:
             cell_size=cell,
             section_size=self.section,
             cell_color=GRID,
-            section_color=LINE,
-            cell_thickness=0.8,
-            section_thickness=1.0,
+            section_color=GRID,
+            cell_thickness=0.4,
+            section_thickness=0.8,
             fade_distance=14.0 * self.scene.reach,
             shadow_opacity=0.0,
         )
