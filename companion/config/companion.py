@@ -77,7 +77,9 @@ class CompanionConfig(Settings):
         description="methods to leave the field's local minima, in this order; baseline adds nothing",
     )
     turning_sense: TurningSense = Field(
-        "own", description="'own': by approach, as the paper; otherwise one sense for all vehicles"
+        "own",
+        description="'own': by approach, as the paper; otherwise one sense for all vehicles."
+        " Committed plans turn to the right unless it is 'left': with 'own', too",
     )
     avoidance: Avoidance = Field(
         "field", description="'field': the paper's; 'certified': committed plans between moving planes"

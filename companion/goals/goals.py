@@ -108,6 +108,7 @@ class Goals:
         self._lane, self._clearance = 0.0, self._above_target(system)
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
+        self._floor = -inf
         # Committed plans have their ways from the ends of plans on.
         least = config.field.d_min + config.field.margin(1)
         self._way = way_of(config, least) if config.avoidance == "field" else None
@@ -138,6 +139,10 @@ class Goals:
             config = self._config.model_copy(update={"limits": limits})
             self._settling = Settling(config, self._unshared, self._roofs)
             self._nearest = inf
+            self._floor = limits.within(self._config.field.margin(1)).box_min[2]
+            if self._way is not None:
+                self._way.forget()
+                self._way.keep_above(self._floor)
         elif phase is Phase.ESCORT and self._config.task == "escort" and view.target is not None:
             self._held = None
 
@@ -206,7 +211,7 @@ class Goals:
                 self._pilot.settled()
         elif phase is not Phase.HOLD and task == "goto":
             began = measured.position if self._began is None else self._began
-            place = began if self.goal is None else self.goal
+            place = began if self.goal is None else self._above_floor(self.goal)
         elif phase is not Phase.HOLD and target is not None:
             return self._around(now, target, measured, mates, sight)
         else:
@@ -263,6 +268,12 @@ class Goals:
         if 0 < len(others) == len(neighbours):
             apart = spacing(hypot(here[0], here[1]), len(others), turn)
         return max(-formation.turn, min(formation.turn, turn)), apart
+
+    def _above_floor(self, place: Array) -> Array:
+        """Return the ``place`` (3,), m, raised to the floor of plans if ``guard.least_height`` is set."""
+        if self._config.guard.least_height is None or place[2] >= self._floor:
+            return place
+        return np.array([place[0], place[1], self._floor])
 
     def _place_to_hold(self, measured: Motion) -> Array:
         """Return the position (3,) at the order to hold or to return, or at the loss of the target."""

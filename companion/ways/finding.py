@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from companion.values.horizon import Array
 from companion.ways.clearance import Clearance
 from companion.ways.corners import shortened
+from companion.ways.grid import lowest
 from companion.ways.search import Search
 
 _CELLS = 250
@@ -26,18 +28,20 @@ class Found(NamedTuple):
 
 
 def finding(
-    clear: Clearance, clearances: Sequence[float], place: Array, goal: Array
+    clear: Clearance, clearances: Sequence[float], place: Array, goal: Array, floor: float = -inf
 ) -> Generator[None, None, Found | None]:
     """Return the way from ``place`` to ``goal`` (3,), m, of the first of ``clearances`` (m) with one.
 
-    None: there is no way. It yields after each part of the work.
+    It keeps at the height ``floor`` (m) or above, except where an end is lower. None: there is no way. It
+    yields after each part of the work.
     """
+    layer = lowest(clear.grid, floor)
     for level, clearance in enumerate(clearances):
-        start = yield from _cell(clear, clearance, place)
-        last = yield from _cell(clear, clearance, goal)
+        start = yield from _cell(clear, clearance, place, layer)
+        last = yield from _cell(clear, clearance, goal, layer)
         if start is None or last is None:
             continue
-        search = Search(clear, clearance, start, last)
+        search = Search(clear, clearance, start, last, layer)
         while not search.go_on(_CELLS):
             yield
         cells = search.cells()
@@ -47,8 +51,10 @@ def finding(
     return None
 
 
-def _cell(clear: Clearance, clearance: float, end: Array) -> Generator[None, None, int | None]:
+def _cell(clear: Clearance, clearance: float, end: Array, layer: int) -> Generator[None, None, int | None]:
     """Return the nearest cell of ``clearance`` (m) to which the line from ``end`` (3,), m, is free; or None.
+
+    It is in the ``layer`` of the grid or above.
 
     Near an end that is nearer to an obstacle less is enough (``Clearance.sees``).
     """
@@ -57,7 +63,8 @@ def _cell(clear: Clearance, clearance: float, end: Array) -> Generator[None, Non
     reach = 2.0 * (missing + grid.cell)
     steps = np.stack(np.unravel_index(grid.nearest(end), grid.shape))
     beyond = int(np.ceil(reach / grid.cell))
-    low, high = np.maximum(steps - beyond, 0), np.minimum(steps + beyond + 1, grid.shape)
+    low, high = np.maximum(steps - beyond, (0, 0, layer)), np.minimum(steps + beyond + 1, grid.shape)
+    high[2] = max(high[2], layer + 1)
     x, y, z = (np.arange(a, b) for a, b in zip(low.tolist(), high.tolist(), strict=True))
     cells = ((x[:, None, None] * grid.shape[1] + y[:, None]) * grid.shape[2] + z).reshape(-1)
     # A cell of less clearance than this has no edge.

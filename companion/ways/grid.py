@@ -6,6 +6,7 @@ as asked for, and larger where the box would hold too many.
 
 from __future__ import annotations
 
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -60,3 +61,12 @@ def grid(limits: LimitsConfig, cell: float, most: int, level: float | None = Non
     first = 0.5 * (low + high - cell * (count - 1))
     first.flags.writeable = False
     return Grid(first, (x, y, z), cell)
+
+
+def lowest(places: Grid, floor: float) -> int:
+    """Return the lowest layer of a grid whose places are at the height ``floor`` (m) or above.
+
+    That is the highest one if none is, and the only one of a plane.
+    """
+    steps = (floor - float(places.first[2])) / places.cell
+    return min(max(ceil(steps - 1e-9), 0), places.shape[2] - 1) if steps > 0.0 else 0

@@ -20,6 +20,7 @@ from companion.ways.grid import Indices
 
 _LEFT, _GROWS = 0.9, 0.3
 """Near an end beside an obstacle this share of its clearance is enough, if that grew so much a metre."""
+_ROUNDING = 1e-9
 
 
 @part
@@ -82,8 +83,9 @@ def compare(
     The places are in cells of edge ``cell`` (m) from the first of the grid; the line is checked at n places.
     ``begin``, ``end``: clearances (m) at the two ends, near which less is enough. Returns −1 where a place is
     too near to an obstacle, otherwise how many are ``doubtful`` (n,). Unless ``exact`` these are only places
-    nearer than a cell, because cells do not show a thin obstacle. ``wanted`` (n,), m: clearances that are
-    enough for the line to keep the ``clearance`` between the places, too.
+    nearer than a cell, because cells do not show a thin obstacle, and those near an end beside an obstacle.
+    ``wanted`` (n,), m: clearances that are enough for the line to keep the ``clearance`` between the places,
+    too.
     """
     count, at, left = len(wanted) - 1, np.empty(3), 0
     length = cell * sqrt((last[0] - first[0]) ** 2 + (last[1] - first[1]) ** 2 + (last[2] - first[2]) ** 2)
@@ -93,7 +95,7 @@ def compare(
             at[axis] = first[axis] + share * (last[axis] - first[axis])
         near = min(begin + _GROWS * share * length, end + _GROWS * (1.0 - share) * length)
         least = max(min(_LEFT * near, clearance), 0.0)
-        wanted[n] = min(sqrt(least * least + 0.25 * (length / count) ** 2), max(near, 0.0))
+        wanted[n] = min(sqrt(least * least + 0.25 * (length / count) ** 2), max(near - _ROUNDING, 0.0))
         index, error = _from_nearest(shape, at)
         # Where the cell alone tells, nothing is interpolated.
         doubtful[n] = clear[index] - cell * error < wanted[n]
@@ -101,8 +103,9 @@ def compare(
             if clear[index] + cell * error < wanted[n]:
                 return -1
             if not exact and wanted[n] >= cell:
-                doubtful[n] = False
-                if _between(clear, shape, at) < wanted[n]:
+                doubtful[n] = _between(clear, shape, at) < wanted[n]
+                # In a corner of two obstacles the interpolated value is too small by up to half a cell.
+                if doubtful[n] and least >= clearance:
                     return -1
             left += doubtful[n]
     return left

@@ -32,10 +32,13 @@ _NOT_IN_HEAP, _CLOSED = -1, -2
 
 
 class Search:
-    """Search of a way of ``clearance`` (m) from the cell ``start`` to the cell ``goal``."""
+    """Search of a way of ``clearance`` (m) from the cell ``start`` to the cell ``goal``.
 
-    def __init__(self, clear: Clearance, clearance: float, start: int, goal: int) -> None:
-        self._clear, self._clearance, self._goal = clear, clearance, goal
+    ``layer``: the lowest layer of the grid that it uses.
+    """
+
+    def __init__(self, clear: Clearance, clearance: float, start: int, goal: int, layer: int = 0) -> None:
+        self._clear, self._clearance, self._goal, self._layer = clear, clearance, goal, layer
         count = len(clear.grid)
         self._length, self._key = np.full(count, inf), np.full(count, inf)
         self._before = np.full(count, -1, dtype=np.int32)
@@ -63,6 +66,7 @@ class Search:
                 grid.cell,
                 self._clearance,
                 self._goal,
+                self._layer,
                 cells,
                 self._size,
                 self._length,
@@ -150,6 +154,7 @@ def _onward(x: int, y: int, z: int) -> float:
     FLOAT,
     INT,
     INT,
+    INT,
     output(1, INT),
     output(1),
     output(1),
@@ -163,6 +168,7 @@ def _expand(
     edge: float,
     clearance: float,
     goal: int,
+    layer: int,
     most: int,
     size: Indices,
     length: Array,
@@ -173,8 +179,9 @@ def _expand(
 ) -> tuple[int, int]:
     """Expand at most ``most`` cells; return how many, and the state of the search.
 
-    ``clear`` (n,): clearances of the nx·ny·nz cells. ``size`` (1,): of the ``heap`` (n,). ``length``, ``key``
-    (n,): g and g + h of each cell; ``before`` (n,): the one before it; ``place`` (n,): its place in the heap.
+    ``clear`` (n,): clearances of the nx·ny·nz cells; none below ``layer`` is entered. ``size`` (1,): of
+    the ``heap`` (n,). ``length``, ``key`` (n,): g and g + h of each cell; ``before`` (n,): the one before it;
+    ``place`` (n,): its place in the heap.
     """
     gx, gy, gz = goal // (ny * nz), goal // nz % ny, goal % nz
     least = clearance * clearance if clearance > 0.0 else 0.0
@@ -188,7 +195,7 @@ def _expand(
         x, y, z = cell // (ny * nz), cell // nz % ny, cell % nz
         for i in range(max(x - 1, 0), min(x + 2, nx)):
             for j in range(max(y - 1, 0), min(y + 2, ny)):
-                for k in range(max(z - 1, 0), min(z + 2, nz)):
+                for k in range(max(z - 1, layer), min(z + 2, nz)):
                     other = (i * ny + j) * nz + k
                     if place[other] == _CLOSED:
                         continue

@@ -10,6 +10,7 @@ has, and without one at the destination, as it does where there is no way.
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from math import inf
 
 import numpy as np
 
@@ -28,6 +29,8 @@ _SEEN = 0.85
 """Share of the clearance of a way with which its places are seen from a vehicle beside the way."""
 _MOVED_M = 0.5
 """Distance by which the destination or the vehicle must have moved before a search is repeated."""
+_JUMP_M = 2.0
+"""Distance from plan to plan from which on the destination is another one, and none that moves."""
 
 
 class Way:
@@ -56,6 +59,8 @@ class Way:
         self._lower: tuple[int, Array] | None = None
         self._search: Generator[None, None, Found | None] | None = None
         self._ends: tuple[Array, Array] | None = None
+        self._goal: Array | None = None
+        self._floor = -inf
         self.begun = 0
         """Number of ways that were begun."""
         self.enclosed = False
@@ -63,11 +68,26 @@ class Way:
         self.clear = False
         """Whether no fixed obstacle is between the vehicle and the sub-goal that it was last given."""
 
+    def forget(self) -> None:
+        """Drop the way and the search of one, because the next destination is another one."""
+        self._followed = self._search = self._ends = self._lower = self._goal = None
+        self.enclosed = False
+
+    def keep_above(self, floor: float) -> None:
+        """Search ways at the height ``floor`` (m) or above from now on; the present one is dropped."""
+        if floor != self._floor:
+            self._floor = floor
+            self.forget()
+
     def towards(self, place: Array, goal: Array) -> Subgoal:
         """Return the sub-goal of a plan that is made now, from ``place`` (3,) towards ``goal`` (3,), m.
 
-        Call it once for each plan. Without a way, or where the straight way is free, it is the goal.
+        Call it once for each plan. Without a way, or where the straight way is free, it is the goal. From a
+        destination that jumps no way and no search is kept.
         """
+        if self._goal is not None and float(np.abs(self._goal - goal).max()) > _JUMP_M:
+            self.forget()
+        self._goal = goal
         clear = self._clear
         if clear is None:
             self._level = float(place[2])
@@ -130,7 +150,7 @@ class Way:
                 if max(float(np.abs(old - new).max()) for old, new in pairs) < _MOVED_M:
                     return
             self._ends = place, goal
-            self._search = finding(clear, self._clearances, place, goal)
+            self._search = finding(clear, self._clearances, place, goal, self._floor)
         for _ in range(self._parts):
             try:
                 next(self._search)

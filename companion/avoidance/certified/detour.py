@@ -5,25 +5,26 @@ of posts and of vehicles that have arrived, which with a least distance of 4.7 m
 A vehicle that makes no progress although its goal was turned in full searches a way among the discs that
 posts, landed and resting vehicles cover at its height. It aims along this way until the straight line to its
 goal is free. It keeps to its way while this is free, because two ways of nearly the same length would
-alternate otherwise. Only the cost changes.
+alternate otherwise. A long search is spread over plans, in parts that do not depend on the speed of the
+computer. Only the cost changes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from companion.avoidance.certified.visibility_graph import Discs, free, way, without
+from companion.avoidance.certified.visibility_graph import Discs, finding, free, without
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Array
 from companion.ways.subgoal import Subgoal
 
 _EVERY_US, _AGAIN_US = 1_000_000, 5_000_000
-"""Shortest time (µs) between two searches, which take some milliseconds among twenty discs; and after one
-without a way, which among eight boxes takes a tenth of a second.
-"""
+"""Shortest time (µs) between two searches, and after one without a way."""
+_PARTS = 12
+"""Corners of which a plan works out the lines, at most: some milliseconds among eight boxes."""
 _MOVED_M = 0.5
 """Distance by which the goal may move before the way is searched anew."""
 
@@ -36,6 +37,7 @@ class Detour:
         self._ahead = ahead
         self._way: Array | None = None
         self._next_search = 0
+        self._looking: Generator[None, None, Array | None] | None = None
         self.begun = 0
         """Number of ways that were begun."""
 
@@ -48,25 +50,44 @@ class Detour:
         Without a way, the sub-goal is the goal.
         """
         if self._way is None and not stalled:
+            self._looking = None
             return Subgoal(goal, 0.0)
         choices = discs()
         here, there = rest[:2], goal[:2]
         if free(here, there[None], without(here, without(there, choices[0])))[0]:
-            self._way = None
+            self._way = self._looking = None
             return Subgoal(goal, 0.0)
         if not self._still_free(here, there, choices[0]):
             self._search(now, here, there, choices)
         return Subgoal(goal, 0.0) if self._way is None else self._along(self._way, rest, goal)
 
     def _search(self, now: int, here: Array, there: Array, choices: Sequence[Discs]) -> None:
-        if now < self._next_search:
-            return
+        if self._looking is None:
+            if now < self._next_search:
+                return
+            self._looking = self._first(here, there, choices)
+        # While it is searched there is no way: the old one is not free.
+        self._way = None
+        for _ in range(_PARTS):
+            try:
+                next(self._looking)
+            except StopIteration as end:
+                self._looking, self._way = None, end.value
+                self._next_search = now + (_AGAIN_US if self._way is None else _EVERY_US)
+                self.begun += self._way is not None
+                return
+
+    def _first(
+        self, here: Array, there: Array, choices: Sequence[Discs]
+    ) -> Generator[None, None, Array | None]:
+        """Return the way among the first of ``choices`` that leave one; it yields after each part."""
         # What stays for ever alone is another choice only where something else rests.
         different = [discs for discs in choices[1:] if len(discs.radii) < len(choices[0].radii)]
-        found = (way(here, there, discs, self._low, self._high) for discs in (choices[0], *different))
-        self._way = next((one for one in found if one is not None), None)
-        self._next_search = now + (_AGAIN_US if self._way is None else _EVERY_US)
-        self.begun += self._way is not None
+        for discs in (choices[0], *different):
+            found = yield from finding(here, there, discs, self._low, self._high)
+            if found is not None:
+                return found
+        return None
 
     def _still_free(self, here: Array, there: Array, discs: Discs) -> bool:
         """Return whether the way still leads to ``there``; drop the corners that lie behind."""

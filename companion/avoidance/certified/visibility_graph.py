@@ -7,6 +7,7 @@ rectangle; two of them are connected if the straight line between them meets not
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from heapq import heappop, heappush
 from typing import NamedTuple
 
@@ -71,11 +72,13 @@ class Discs(NamedTuple):
     rectangles: Rectangles = _NO_RECTANGLES
 
 
-def way(start: Array, goal: Array, discs: Discs, low: Array, high: Array) -> Array | None:
+def finding(
+    start: Array, goal: Array, discs: Discs, low: Array, high: Array
+) -> Generator[None, None, Array | None]:
     """Return the corners (k, 2) of the shortest way from ``start`` (2,) to ``goal`` (2,), the last; m.
 
     The corners are within ``low`` and ``high`` (2,). A disc that holds the start or the goal is reduced until
-    it does not. None: there is no way.
+    it does not. None: there is no way. It yields after each corner whose lines it worked out.
     """
     discs = without(start, without(goal, discs))
     nodes = np.vstack([start, goal, _corners(discs, low, high)])
@@ -98,6 +101,7 @@ def way(start: Array, goal: Array, discs: Discs, low: Array, high: Array) -> Arr
             if new < lengths[one]:
                 lengths[one], before[one] = new, node
                 heappush(queue, (new + float(rest[one]), one))
+        yield
     return None
 
 

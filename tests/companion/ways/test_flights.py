@@ -137,3 +137,32 @@ def test_committed_plans_pass_a_gap_as_wide_as_the_least_distance_of_obstacles(
     places = flown(of, 25.0, BEHIND)
     assert (off(of, BEHIND) < 0.3) == (least is not None)
     assert FixedObstacles(tuple(gap)).distance(places).min() > (0.5 if least is None else least)
+
+
+def test_an_order_to_return_among_walls_is_not_flown_along_the_old_way() -> None:
+    """It leaves the pocket towards a goal behind it. The way back is searched for some plans."""
+    of = bench(way={"parts": 1}).take_off()
+    of.go_to(BEHIND)
+    of.fly(4.0)
+    goals = of.companion._goals
+    assert goals._way is not None
+    assert goals._way.begun == 1
+    of.order(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    of.fly(0.1)
+    assert of.phase is Phase.RETURN
+    followed = goals._way._followed
+    assert followed is None or np.linalg.norm(followed.corners[-1][:2] - [-1.0, 0.0]) < 0.5
+
+
+@pytest.mark.parametrize("least", [None, 6.75])
+def test_an_ordered_goal_and_the_way_to_it_keep_the_least_height(least: float | None) -> None:
+    """A wall from side to side that hangs down to 7 m, and a goal behind it at 4 m."""
+    hanging = [Box(kind="box", at=(4.0, 0.0, 8.0), size=(1.0, 24.0, 2.0))]
+    of = bench(hanging, guard={"least_height": least}, way={"clearance": 0.0}).take_off()
+    of.go_to((10.0, 0.0, 4.0))
+    places = flown(of, 12.0, (10.0, 0.0, 4.0))
+    assert (off(of, (10.0, 0.0, 4.0)) < 0.3) == (least is None)
+    if least is not None:
+        assert places[:, 0].max() < 4.0
+        assert of.companion._goals.enclosed
+        assert places[-1, 2] > 6.5

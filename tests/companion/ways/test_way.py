@@ -11,7 +11,9 @@ from companion.config.obstacles import Box, Wall
 from companion.config.planning import LimitsConfig
 from companion.config.way import WayConfig
 from companion.obstacles.static import FixedObstacles
+from companion.ways.clearance import Clearance
 from companion.ways.finding import finding
+from companion.ways.grid import grid
 from companion.ways.search import Search
 from companion.ways.way import Way
 from tests.companion.ways.worlds import (
@@ -266,3 +268,59 @@ def test_a_point_passes_bends_that_are_nearer_to_each_other_than_places_where_it
     assert np.abs(places[-1] - goal).max() < 1e-6
     assert leads.begun == 1
     assert least(boxes, places) >= 0.15
+
+
+def test_from_every_place_beside_the_walls_of_a_corridor_a_way_leads() -> None:
+    """A corridor of half a metre with a bend; ways keep 0.2 m, a vehicle may be anywhere in it."""
+    closed = ["#######", "......#", "#####.#", "#.....#", "#.#####", "#......", "#######"]
+    boxes = [
+        Box(kind="box", at=(0.5 * x, -0.5 * y, 1.25), size=(0.5, 0.5, 2.5))
+        for y, cells in enumerate(closed)
+        for x, cell in enumerate(cells)
+        if cell == "#"
+    ]
+    limits = LimitsConfig(box_min=(-1.0, -3.3, 0.5), box_max=(4.0, 0.3, 2.5))
+    clear = Clearance(boxes, grid(limits, 0.1, 150_000, 1.0), 0.5)
+    goal = np.array([3.6, -2.5, 1.0])
+    middles = np.array([[2.5, -0.5, 1.0], [2.5, -1.0, 1.0], [0.5, -1.5, 1.0], [0.5, -2.5, 1.0]])
+    for middle in middles:
+        for corner in range(4):
+            for off in (0.05, 0.1, 0.15, 0.2):
+                place = middle + off * np.array([1 - corner // 2 * 2, 1 - corner % 2 * 2, 0.0])
+                found = result(finding(clear, (0.2,), place, goal))
+                assert found is not None, place
+                assert least(boxes, found.corners) >= 0.9 * min(0.2, 0.25 - off)
+
+
+def test_after_the_destination_has_jumped_nothing_leads_to_the_old_one() -> None:
+    """Neither a way that is followed, nor a search that was under way."""
+    home = np.array([0.0, -9.0, 5.0])
+    leads = way(POCKET)
+    flown(leads, INSIDE, BEHIND, steps=30)
+    assert leads.begun == 1
+    assert leads.towards(INSIDE, home).place is home
+    searching = way(POCKET, parts=1)
+    for _ in range(3):
+        searching.towards(INSIDE, BEHIND)
+    while searching.begun == 0:
+        subgoal = searching.towards(INSIDE, home)
+    # The length of a way out of the pocket and back to the south of it, not behind it.
+    ahead = float(np.linalg.norm(subgoal.place - INSIDE)) + subgoal.beyond
+    assert ahead < 24.0
+    assert searching._followed is not None
+    assert (searching._followed.corners[-1] == home).all()
+    searching.forget()
+    assert searching.towards(INSIDE, home).place is home
+
+
+@pytest.mark.parametrize(("floor", "passes"), [(3.0, True), (3.9, True), (4.1, False), (9.0, False)])
+def test_no_way_leads_below_the_floor(floor: float, passes: bool) -> None:
+    """A wall from side to side that hangs from the ceiling down to 5 m."""
+    hanging = [Box(kind="box", at=(0.0, 0.0, 7.0), size=(1.0, 22.0, 4.0))]
+    leads = way(hanging, clearance=0.0)
+    leads.keep_above(floor)
+    places = flown(leads, np.array([-6.0, 0.0, 7.0]), np.array([6.0, 0.0, 7.0]))
+    assert leads.enclosed == (not passes)
+    if passes:
+        assert np.abs(places[-1] - [6.0, 0.0, 7.0]).max() < 1e-6
+        assert places[:, 2].min() >= floor

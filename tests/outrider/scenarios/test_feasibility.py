@@ -76,6 +76,30 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         },
         "vehicle 11 has its goal at [-5, 0, 5] 0.30 m from obstacles[0], a post at [-5, 1]",
     ),
+    "a box over a start": (
+        {
+            "starts": {**POINTS, "at": [[0, 0, 5], [9, 0, 9]], "goals": [[-5, 0, 5], [-9, 5, 5]]},
+            "obstacles": [BOX],
+        },
+        "vehicle 12 starts at [9, 0, 9] inside obstacles[0], a box at [9, 0, 5]",
+    ),
+    "a box beside a column": (
+        {
+            "starts": {**POINTS, "at": [[0, 0, 5], [10.7, 0, 9]], "goals": [[-5, 0, 5], [-9, 5, 5]]},
+            "obstacles": [BOX],
+            "companion": {"avoidance": "certified", "certified": {"drift": 0.4}},
+        },
+        "vehicle 12 takes off, within certified.drift = 0.4 m of its start, at [10.7, 0, 9] 0.30 m from"
+        " obstacles[0], a box at [9, 0, 5]; allowed: at least d_min_obstacle = 0.5 m",
+    ),
+    "more than vehicles keep": (
+        {
+            "starts": {**POINTS, "at": [[0, 0, 5], [9, 0, 5]], "goals": [[-5, 0, 5], [-9, 5, 5]]},
+            "d_min": 0.7,
+            "companion": {"field": {"d_min": 0.6}},
+        },
+        "d_min: 0.7 m is more than vehicles keep, companion.field.d_min = 0.6 m; allowed: at most 0.6",
+    ),
     "a world that was not read": (
         {
             "starts": {**POINTS, "at": [[0, 0, 5], [9, 0, 5]], "goals": [[-5, 0, 5], [-9, 5, 5]]},
@@ -99,6 +123,16 @@ def test_a_start_and_a_goal_beside_obstacles_can_work_and_in_the_air_also_above_
     places = {"at": [[0, 0, 8], [9, 0, 8]], "goals": [[-5, 0, 5], [9, 0, 8]]}
     above = scenario("obstacles", **GOTO, starts={**POINTS, **places}, obstacles=[BOX], airborne=True)
     assert not list(obstacles_to(above, FIREFLY.span))
+
+
+def test_the_column_has_to_be_free_only_where_an_autopilot_climbs_in_it() -> None:
+    """0.7 m beside a box below the start: in the field, in the air, or with a narrower column it can work."""
+    places = {"at": [[0, 0, 5], [10.7, 0, 9]], "goals": [[-5, 0, 5], [-9, 5, 5]]}
+    changes: dict[str, Any] = {**GOTO, "starts": {**POINTS, **places}, "obstacles": [BOX]}
+    committed = {"avoidance": "certified", "certified": {"drift": 0.4}}
+    narrow = {"avoidance": "certified", "certified": {"drift": 0.15, "tube": 0.1}}
+    for more in ({}, {"companion": committed, "airborne": True}, {"companion": narrow}):
+        assert not list(obstacles_to(scenario("obstacles", **changes, **more), FIREFLY.span))
 
 
 def test_above_a_post_only_the_field_can_work() -> None:

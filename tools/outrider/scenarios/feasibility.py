@@ -19,15 +19,24 @@ _DENSEST = pi / 18.0**0.5
 """Largest share of a volume that equal balls fill, 0.74."""
 _STEP_M = 0.1
 """Distance between the places of the way up to a start that are checked."""
+_ANGLES = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
+_AROUND = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), np.zeros(len(_ANGLES))], axis=1)
+"""Directions in which the edge of a column is checked."""
 
 
 def obstacles_to(scenario: Scenario, span: float) -> Iterator[str]:
     """Yield a sentence for each reason why the vehicles, ``span`` (m) from tip to tip, cannot fly it.
 
     They are: starts or goals nearer to each other than vehicles are wide, starts or goals outside the box
-    of the plans, a box too small for all vehicles, starts or goals nearer to an obstacle than its d_min, and
-    a world file that was not read.
+    of the plans, a box too small for all vehicles, starts or goals nearer to an obstacle than its d_min, a
+    d_min larger than what planners keep, and a world file that was not read.
     """
+    kept = scenario.companion.field.d_min
+    if scenario.vehicles > 1 and scenario.d_min > kept:
+        yield (
+            f"d_min: {scenario.d_min:g} m is more than vehicles keep, companion.field.d_min = {kept:g} m;"
+            f" allowed: at most {kept:g}, or a larger companion.field.d_min"
+        )
     if scenario.world is not None:
         yield f"world: {scenario.world} was not read; allowed: in a scenario file only"
     starts, goals = places(scenario)
@@ -54,8 +63,9 @@ def obstacles_to(scenario: Scenario, span: float) -> Iterator[str]:
 def in_obstacles(starts: Array, goals: Array | None, scenario: Scenario) -> Iterator[str]:
     """Yield a sentence for each of ``starts`` (K, 3) and ``goals``, m, too near to a fixed obstacle.
 
-    The way up to a start from the ground counts with it. With committed plans no height above a post counts:
-    no plane would keep a vehicle that begins there above it.
+    The way up to a start from the ground counts with it; with committed plans all of the column in which the
+    autopilot takes the vehicle up, ``certified.drift`` about its axis. With these no height above a post
+    counts: no plane would keep a vehicle that begins there above it.
     """
     if not scenario.obstacles:
         return
@@ -64,7 +74,14 @@ def in_obstacles(starts: Array, goals: Array | None, scenario: Scenario) -> Iter
         lowest = place[2] if scenario.airborne else 0.0
         climb = np.repeat(place[None], 1 + ceil(abs(place[2] - lowest) / _STEP_M), axis=0)
         climb[:, 2] = np.linspace(place[2], lowest, len(climb))
-        yield from _near_obstacle(f"vehicle {FIRST_SYSTEM + k} starts", climb, scenario, fixed)
+        who = f"vehicle {FIRST_SYSTEM + k}"
+        found = list(_near_obstacle(f"{who} starts", climb, scenario, fixed))
+        if not found and scenario.companion.avoidance == "certified" and not scenario.airborne:
+            drift = scenario.companion.certified.drift
+            column = (climb[:, None] + drift * _AROUND).reshape(-1, 3)
+            what = f"{who} takes off, within certified.drift = {drift:g} m of its start,"
+            found = list(_near_obstacle(what, np.vstack([climb, column]), scenario, fixed))
+        yield from found
     for k, place in enumerate(() if goals is None else goals):
         yield from _near_obstacle(f"vehicle {FIRST_SYSTEM + k} has its goal", place[None], scenario, fixed)
 

@@ -131,7 +131,7 @@ class Scenario(Part):
     d_min: Length = Field(
         0.5,
         description="m between centres of vehicles; below it is a violation. It only judges the flight: the"
-        " planners keep companion.field.d_min, so change both",
+        " planners keep companion.field.d_min, which must be as large",
     )
     d_min_target: Length | None = Field(None, description="m to the target; null: the target is no obstacle")
     d_min_obstacle: Length = Field(0.5, description="m from a vehicle's centre to an obstacle's surface")

@@ -9,17 +9,25 @@ from typing import Any
 import numpy as np
 import pytest
 
+from companion.avoidance.certified import detour as module
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.detour import Detour, Subgoal
-from companion.avoidance.certified.visibility_graph import Discs, Rectangles, free, way
+from companion.avoidance.certified.visibility_graph import Discs, Rectangles, finding, free
 from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.plans import EPOCH, STEPS
 from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.ways.worlds import result
 
 LOW, HIGH = np.full(2, -30.0), np.full(2, 30.0)
 NOTHING = Discs(np.empty((0, 2)), np.empty(0))
+
+
+def way(*scene: Any) -> Array | None:
+    """The way that a whole search finds."""
+    found: Array | None = result(finding(*scene))
+    return found
 
 
 def drawn(seed: int) -> tuple[Array, Array, Discs]:
@@ -172,6 +180,66 @@ def test_without_a_stall_the_goal_is_the_goal_and_a_free_line_ends_a_way() -> No
     assert detour.towards(200_000, rest, goal, lambda: wall, stalled=False).place[1] == aside.place[1]
     assert detour.towards(400_000, rest, goal, lambda: [NOTHING], stalled=False) == Subgoal(goal, 0.0)
     assert detour.towards(600_000, rest, goal, lambda: wall, stalled=False).place is goal
+
+
+def boxes(seed: int) -> tuple[Array, Array, Discs]:
+    """Eight boxes, and a ring of discs around the goal that leaves no way."""
+    random = np.random.default_rng(seed)
+    turns = random.uniform(0.0, np.pi, 8)
+    ring = 2.0 * np.pi * np.arange(12) / 12
+    return (
+        np.array([-14.0, 0.0]),
+        np.array([14.0, 0.0]),
+        Discs(
+            np.array([14.0, 0.0]) + 4.0 * np.stack([np.cos(ring), np.sin(ring)], axis=1),
+            np.full(12, 1.2),
+            Rectangles(
+                random.uniform([-10.0, -10.0], [7.0, 10.0], (8, 2)),
+                random.uniform(0.5, 1.5, (8, 2)),
+                np.stack([np.cos(turns), np.sin(turns)], axis=1),
+                np.full(8, 0.6),
+            ),
+        ),
+    )
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_no_plan_does_more_than_a_part_of_a_search(closed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    here, there, discs = boxes(1)
+    if not closed:
+        discs = discs._replace(centres=np.delete(discs.centres, [5, 6, 7], axis=0), radii=discs.radii[3:])
+    parts = 0
+
+    def counted(*scene: Any) -> Any:
+        nonlocal parts
+        work = finding(*scene)
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                return end.value
+            parts += 1
+            yield
+
+    whole = way(here, there, discs, LOW, HIGH)
+    assert (whole is None) == closed
+    monkeypatch.setattr(module, "finding", counted)
+    limits = LimitsConfig(box_min=(-30.0, -30.0, 3.0), box_max=(30.0, 30.0, 10.0))
+    detour = Detour(limits, 3.0)
+    rest, goal = np.array([*here, 5.0]), np.array([*there, 5.0])
+    plans, most = 0, 0
+    for plan in range(24):
+        before = parts
+        subgoal = detour.towards(200_000 * plan, rest, goal, lambda: [discs], stalled=True)
+        most, plans = max(most, parts - before), plans + (parts > before)
+        if detour.begun:
+            break
+    assert 0 < most <= 30
+    assert plans > 1
+    if whole is not None:
+        assert float(np.linalg.norm(subgoal.place - rest)) + subgoal.beyond == pytest.approx(
+            length(here, whole)
+        )
 
 
 POCKET = np.array(
