@@ -31,6 +31,9 @@ async def fly_target(drone: System) -> None:
     """Take off, fly 15 m to the north, and stay there."""
     await drone.connect(system_address=f"tcpout://127.0.0.1:{TARGET}")
     await first(drone.core.connection_state(), lambda state: state.is_connected)
+    # ArduCopter tells only what it is asked for; its place is what the companion follows.
+    await drone.telemetry.set_rate_health(2.0)
+    await drone.telemetry.set_rate_position(10.0)
     await first(drone.telemetry.health(), lambda health: health.is_armable)
     await drone.action.set_takeoff_altitude(3.0)
     await drone.action.arm()

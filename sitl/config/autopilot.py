@@ -59,10 +59,10 @@ class AutopilotConfig(BaseModel):
     altitude: FiniteFloat = Field(0.0, description="of the ground at the start, m above mean sea level")
     yaw: FiniteFloat = Field(0.0, description="at the start, clockwise from north")
     rates: TelemetryRates = TelemetryRates()
-    streams: Literal["quiet", "normal", "asked"] = Field(
+    streams: Literal["quiet", "normal"] = Field(
         "quiet",
-        description="quiet: ``rates``, what companions need; normal: what ground stations expect; asked: as"
-        " normal, but ArduPilot streams only HEARTBEAT, and TIMESYNC every 10 s, until a client asks",
+        description="quiet: ``rates``, what companions need; normal: what the firmware streams unasked:"
+        " PX4 all that ground stations need, ArduPilot HEARTBEAT, and TIMESYNC every 10 s",
     )
     sensors: ProfileName = Field(
         "truth", description="how good its estimate is: truth, rtk, gnss or sih (PX4's own simulation)"

@@ -8,26 +8,9 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from sitl.config.autopilot import AutopilotConfig, TelemetryRates
 
-# A real ArduCopter sends only HEARTBEAT and STATUSTEXT before a request, which usually asks for 4 Hz. Some
-# scripts request nothing, so the streams run from the start here.
+# ArduCopter's SRn_ parameters are 0, so every other message waits for a request; sim_vehicle.py appears to
+# stream because MAVProxy requests 4 Hz.
 _ARDUPILOT: Final = TelemetryRates(
-    sys_status=2.0,
-    attitude=4.0,
-    attitude_quaternion=4.0,
-    local_position=4.0,
-    global_position=4.0,
-    gps_global_origin=0.0,
-    position_target=2.0,
-    extended_sys_state=2.0,
-    ekf_status=2.0,
-    system_time=1.0,
-    gps_raw=2.0,
-    mission_current=1.0,
-    vfr_hud=4.0,
-    battery_status=1.0,
-    home_position=0.5,
-)
-_NOTHING: Final = TelemetryRates(
     **{name: 1.0 if name == "heartbeat" else 0.0 for name in TelemetryRates.model_fields}
 )
 # As recorded from PX4 1.16, but with lower rates of the fast streams: a client that needs 50 Hz requests it.
@@ -97,9 +80,7 @@ def usual_rates(config: AutopilotConfig) -> TelemetryRates:
     """Return the rates of messages before any request."""
     if config.streams == "quiet":
         return config.rates
-    if config.flavour == "px4":
-        return _PX4
-    return _ARDUPILOT if config.streams == "normal" else _NOTHING
+    return _PX4 if config.flavour == "px4" else _ARDUPILOT
 
 
 def further_rates(config: AutopilotConfig) -> tuple[dict[int, float], float] | None:

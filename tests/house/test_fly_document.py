@@ -24,7 +24,16 @@ TEXT = (DOCS / "fly.md").read_text(encoding="utf-8")
 PAGES = [
     DOCS / f"{name}.md" for name in ("fly", "raspberry-pi-px4", "raspberry-pi-ardupilot", "mavlink-router")
 ]
-OF_OTHERS = {"--count", "--first-id", "--port-base", "--to", "--origin", "--sensors", "--response"}
+OF_OTHERS = {
+    "--count",
+    "--first-id",
+    "--port-base",
+    "--to",
+    "--origin",
+    "--sensors",
+    "--response",
+    "--flavour",
+}
 OF_REPLAY = {"--certify"}
 OF_SYSTEM = {"--home-dir", "--shell", "--now"}
 

@@ -50,9 +50,9 @@ def test_its_program_arms_takes_off_and_flies_there() -> None:
     (program,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
     assert program.count("tcp:127.0.0.1:5760") == 1
     with Sitl("ardupilot", 1) as sitl:
-        text = program.replace("tcp:127.0.0.1:5760", sitl.endpoint(0))
-        client = subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True)
         sitl.start()
-        said, _ = client.communicate(timeout=120.0)
-    lines = [line for line in said.splitlines() if not line.startswith("[Errno")]
-    assert lines == ["armed: 0", "take-off: 0", "there"]
+        text = program.replace("tcp:127.0.0.1:5760", sitl.endpoint(0))
+        client = subprocess.run(
+            [sys.executable, "-c", text], capture_output=True, text=True, timeout=120.0, check=False
+        )
+    assert client.stdout.splitlines() == ["armed: 0", "take-off: 0", "there"], client.stderr

@@ -6,7 +6,7 @@ The observer of the emulation receives on a port of its own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,8 @@ _READ = frozenset(
 )
 AGAIN = 500_000
 """Wall time between two requests for missing messages (µs)."""
+_PERIOD: Final = 100_000
+"""Interval (µs) of positions before a companion requests another."""
 
 
 class Observer(Protocol):
@@ -218,7 +220,13 @@ class SitlObserver:
                 mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: one.boot is None,
             }
             for wanted in (number for number, absent in missing.items() if absent):
-                params = (float(wanted), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-                whom = system, mavlink.MAV_COMP_ID_AUTOPILOT1
-                request = CommandLong(OWN, *whom, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, params)
-                self.link.send(self._codec.encode(request))
+                self._order(system, mavlink.MAV_CMD_REQUEST_MESSAGE, wanted, 0)
+            if not one.rows:
+                # ArduPilot streams nothing unasked; companions raise the rate later.
+                position = mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED
+                self._order(system, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, position, _PERIOD)
+
+    def _order(self, system: int, command: int, message_id: int, value: int) -> None:
+        params = (float(message_id), float(value), 0.0, 0.0, 0.0, 0.0, 0.0)
+        order = CommandLong(OWN, system, mavlink.MAV_COMP_ID_AUTOPILOT1, command, 0, params)
+        self.link.send(self._codec.encode(order))

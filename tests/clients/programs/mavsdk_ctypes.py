@@ -59,7 +59,7 @@ async def flight() -> None:
         for system in systems:
             tell("discovered", client=version("mavsdk"), system=await system.get_system_id())
         if several:
-            await asyncio.gather(*(hop(drone_of(system), at) for system in systems))
+            await asyncio.gather(*(hop(drone_of(system), flavour, at) for system in systems))
         else:
             await fly(drone_of(systems[0]), flavour, at)
 

@@ -71,6 +71,22 @@ async def ready(drone: Drone, connected_at: float) -> None:
     await seen(drone, "health_all_ok", lambda good: good)
 
 
+async def ask(drone: Drone) -> None:
+    """For rates: ArduPilot streams nothing unasked. Each message by one name of what it holds."""
+    asked = {
+        "health": 2.0,
+        "home": 0.5,
+        "battery": 1.0,
+        "in_air": 4.0,
+        "gps_info": 2.0,
+        "unix_epoch_time": 1.0,
+    }
+    asked |= dict.fromkeys(("position", "velocity_ned", "attitude_euler", "attitude_quaternion"), 4.0)
+    asked["fixedwing_metrics"] = 4.0
+    for name, rate in asked.items():
+        await getattr(drone.telemetry, f"set_rate_{name}")(rate)
+
+
 async def look(drone: Drone) -> Any:
     """Telemetry of every kind that ground stations show; and home."""
     names = (
@@ -235,6 +251,8 @@ async def land(drone: Drone) -> None:
 async def fly(drone: Drone, flavour: str, connected_at: float) -> None:
     """All of it."""
     ardupilot = flavour == "ardupilot"
+    if ardupilot:
+        await ask(drone)
     await ready(drone, connected_at)
     home = await look(drone)
     if ardupilot:
@@ -248,8 +266,10 @@ async def fly(drone: Drone, flavour: str, connected_at: float) -> None:
     await land(drone)
 
 
-async def hop(drone: Drone, connected_at: float) -> None:
+async def hop(drone: Drone, flavour: str, connected_at: float) -> None:
     """Up and down; who it was stands in its hardware uid."""
+    if flavour == "ardupilot":
+        await ask(drone)
     await ready(drone, connected_at)
     identity = await drone.info.get_identification()
     await take_off(drone)

@@ -22,7 +22,7 @@ async def flight() -> None:
         at = clock()
         tell("discovered", client=version("mavsdk"))
         drone = drone_of(system)
-        await (hop(drone, at) if short else fly(drone, flavour, at))
+        await (hop(drone, flavour, at) if short else fly(drone, flavour, at))
     finally:
         # It does so only when it is collected, which after an error is never: the program would not end.
         system._stop_mavsdk_server()

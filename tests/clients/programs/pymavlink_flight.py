@@ -85,6 +85,11 @@ def connect(vehicle: Vehicle) -> None:
     heartbeat = vehicle.link.wait_heartbeat(timeout=PATIENCE)
     at = clock()
     tell("discovered", client=mavutil.mavlink.WIRE_PROTOCOL_VERSION, type=heartbeat.type)
+    if vehicle.flavour == "ardupilot":
+        # It streams nothing unasked; EXTENDED_SYS_STATE is in none of its groups.
+        link = vehicle.link
+        link.mav.request_data_stream_send(link.target_system, link.target_component, 0, 4, 1)
+        vehicle.order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 245, 500_000)
     bit = mavlink.MAV_SYS_STATUS_PREARM_CHECK
     vehicle.wait("SYS_STATUS", lambda status: status.onboard_control_sensors_health & bit)
     tell("armable", after=round(clock() - at, 3))

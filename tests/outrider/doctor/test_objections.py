@@ -138,7 +138,7 @@ def test_progress_says_what_it_waits_for_and_goes_from_0_to_1() -> None:
         shares.append(consultation.share(now))
         words.add(consultation.doing(now).split(",")[0])
         now += TICK
-    assert words >= {"asking why the pre-arm check fails", "waiting for an autopilot"}
+    assert words >= {"asking why the pre-arm check fails", "listening and asking"}
     assert all(0.0 <= share <= 1.0 for share in shares)
     assert shares[-1] > 0.95
     assert 35_000_000 <= now < 45_000_000

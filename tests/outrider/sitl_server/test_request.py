@@ -195,7 +195,7 @@ def test_a_vehicle_is_what_was_asked_for() -> None:
     node = request.autopilot(2, 1_700_000_000_000_000, Saved())
     config = node.config
     assert (config.system_id, config.flavour, config.sensors) == (9, "px4", "rtk")
-    assert (config.streams, config.startup, config.epoch) == ("asked", "in stages", 1_700_000_000_000_000)
+    assert (config.streams, config.startup, config.epoch) == ("normal", "in stages", 1_700_000_000_000_000)
     assert 20.0 <= config.ready_after <= 40.0
     assert config.battery is not None
     here = request.frame.to_enu(config.latitude, config.longitude, config.altitude)

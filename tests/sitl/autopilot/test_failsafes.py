@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as dialect
 from pymavlink.dialects.v20 import all as mavlink
 
-from mavlink_bridge.messages import FenceStatus, SysStatus
+from mavlink_bridge.messages import FenceStatus, RequestDataStream, SysStatus
 from sitl.autopilot.fences import Breach, Fences, Rules
 from sitl.autopilot.firmware import Mode
 from sitl.autopilot.missions.items import Item
@@ -19,7 +19,7 @@ from sitl.autopilot.missions.plans import Plans
 from sitl.config.autopilot import AutopilotConfig
 from sitl.values.home import Home
 from sitl.values.origin import Origin
-from tests.sitl.autopilot_rig import ARM, FLAVOURS, SITE, VELOCITY_YAW, Rig, setpoint
+from tests.sitl.autopilot_rig import ARM, FLAVOURS, PILOT, SITE, VELOCITY_YAW, Rig, setpoint
 from tests.sitl.mission_client import Way, at, upload
 from tests.sitl.outside_client import Client
 
@@ -51,6 +51,7 @@ def fenced(flavour, **settings_):
     return rig
 
 
+STATUS = RequestDataStream(PILOT, 2, 11, 1, mavlink.MAV_DATA_STREAM_EXTENDED_STATUS, 1)
 ACTIONS = {"hold": Mode.HOLD, "return": Mode.RETURN, "land": Mode.LAND}
 
 
@@ -85,6 +86,7 @@ def test_a_fence_that_is_off_or_only_warns_changes_nothing():
 
 def test_beyond_its_fence_it_is_not_armed_and_says_so():
     rig = Rig("ardupilot", fence={"enabled": "on"}, streams="normal")
+    rig.step(STATUS)
     rig.run(1.1)
     elsewhere = [(x + 100.0, y) for x, y in SQUARE]
     assert upload(Client(rig), polygon(elsewhere), FENCE) == 0
@@ -113,6 +115,7 @@ def test_the_cylinder_around_home_counts_too():
 
 def test_a_breach_is_seen_in_sys_status_and_mavproxy_sees_none_without_one():
     rig = fenced("ardupilot", action="hold")
+    rig.step(STATUS)
     rig.run(1.0)
     assert rig.all(SysStatus)[-1].health & GEOFENCE
     rig.run(9.0, NORTH)

@@ -175,7 +175,7 @@ def test_timesync_and_ping_are_answered():
 
 
 def test_an_ardupilot_streams_nothing_before_a_request_and_then_what_was_requested():
-    rig, found = Rig("ardupilot", streams="asked"), []
+    rig, found = Rig("ardupilot", streams="normal"), []
     for second in range(8):
         begin = len(rig.received)
         if second == 4:

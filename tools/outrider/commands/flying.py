@@ -144,9 +144,7 @@ def sitl(
     physics: Annotated[str, typer.Option(help=PHYSICS)] = "own",
     startup: Annotated[
         str,
-        typer.Option(
-            help="quick, or realistic: GPS and estimator take their time, streams wait for requests."
-        ),
+        typer.Option(help="quick, or realistic: GPS and estimator take their time."),
     ] = "quick",
     response: Annotated[str, typer.Option(help=RESPONSE)] = "firmware",
     origin: Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE[,ALTITUDE].")] = None,

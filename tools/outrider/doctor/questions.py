@@ -54,6 +54,10 @@ _STREAMED: Final = (
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
 )
+_CLOCK: Final[int] = mavlink.MAVLINK_MSG_ID_SYSTEM_TIME
+_MIN_STAMPS: Final = 20
+"""Fewer time stamps say too little of the clock: ArduPilot streams none before a request."""
+_MAX_CLOCK_REQUESTS: Final = 7
 _CAMERA: Final[int] = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
 _ESTIMATOR: Final = {
     True: mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
@@ -74,6 +78,7 @@ class Questions:
         self._examination = examination
         self._asked: dict[int | str, _Asked] = {}
         self._asked_cameras: dict[Source, _Asked] = {}
+        self._clock = _Asked(0, 0)
         self._objections = Objections()
         self._met_at: int | None = None
         self._addressee: Source | None = None
@@ -89,6 +94,7 @@ class Questions:
                 self._addressee, self._met_at = vehicle.source, now
                 self._asked.clear()
                 self._examination.asked.clear()
+                self._clock = _Asked(0, 0)
                 self._objections = Objections()
             self.me = self._examination.me = Source(vehicle.source.system, COMPONENT)
         said: list[Message] = []
@@ -99,18 +105,19 @@ class Questions:
             said += self._ask_cameras(vehicle, now)
             open_ones = [key for key in self._wanted(vehicle, now) if self._is_open(key, vehicle, now)]
             said += [self._ask(key, vehicle, now) for key in open_ones[:_MAX_REQUESTS_PER_STEP]]
+            said += self._ask_clock(vehicle, now)
             said += self._objections.due(vehicle, self.me, now)
         return said
 
     def done(self, now: int) -> bool:
         """Return whether every request was answered, or sent three times and then given 0.7 s for an answer.
 
-        False until 2 s have passed since the vehicle was first received.
+        False until 2 s have passed since the vehicle was first received, and while the clock is being read.
         """
         vehicle = self._examination.vehicle
         if vehicle is None or self._met_at is None or now - self._met_at < _STREAM_WAIT_US:
             return False
-        return not any(
+        return not self._clock_open(vehicle, now) and not any(
             self._asked.get(key, _Asked(0, 0)).times < _MAX_REQUESTS
             or now - self._asked[key].last < _REPEAT_INTERVAL_US
             for key in self._wanted(vehicle, now)
@@ -135,6 +142,23 @@ class Questions:
             said.append(CommandLong(self.me, *camera.source, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, params))
         return said
 
+    def _ask_clock(self, vehicle: SenderRecord, now: int) -> list[Message]:
+        """Return a request for another SYSTEM_TIME, if what streams has too few time stamps."""
+        if not self._clock_open(vehicle, now) or self._clock.times == _MAX_CLOCK_REQUESTS:
+            return []
+        if self._clock.times and now - self._clock.last < _REPEAT_INTERVAL_US:
+            return []
+        self._clock = _Asked(self._clock.times + 1, now)
+        return [self._request(_CLOCK, vehicle)]
+
+    def _clock_open(self, vehicle: SenderRecord, now: int) -> bool:
+        """Return whether the clock is still being read: only of a vehicle that tells its time at all."""
+        if self._met_at is None or now - self._met_at < _STREAM_WAIT_US or _CLOCK not in vehicle.streams:
+            return False
+        if vehicle.clock.stamps >= _MIN_STAMPS:
+            return False
+        return self._clock.times < _MAX_CLOCK_REQUESTS or now - self._clock.last < _REPEAT_INTERVAL_US
+
     def _wanted(self, vehicle: SenderRecord, now: int) -> tuple[int | str, ...]:
         px4 = vehicle.is_px4
         wanted: tuple[int | str, ...] = _RARELY_STREAMED + names(px4=px4)
@@ -153,10 +177,13 @@ class Questions:
     def _ask(self, key: int | str, vehicle: SenderRecord, now: int) -> Message:
         times, _ = self._asked.get(key, _Asked(0, 0))
         self._asked[key] = _Asked(times + 1, now)
-        system, component = vehicle.source
         if isinstance(key, str):
-            return ParamRequestRead(self.me, -1, system, component, key)
-        self._examination.asked[key] = times + 1
+            return ParamRequestRead(self.me, -1, *vehicle.source, key)
+        return self._request(key, vehicle)
+
+    def _request(self, key: int, vehicle: SenderRecord) -> Message:
+        self._examination.asked[key] = self._examination.asked.get(key, 0) + 1
+        system, component = vehicle.source
         params = (float(key), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return CommandLong(self.me, system, component, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, params)
 

@@ -147,10 +147,10 @@ class Request:
 
     def _config(self, index: int, epoch: int) -> AutopilotConfig:
         latitude, longitude, altitude = self.frame.to_geodetic(self.place(index))
-        changes: dict[str, object] = {"streams": "normal"}
+        changes: dict[str, object] = {}
         if self.startup == "realistic":
             ready = _READY_AFTER_S[self.flavour]
-            changes = {"startup": "in stages", "ready_after": ready, "streams": "asked"}
+            changes = {"startup": "in stages", "ready_after": ready}
         return AutopilotConfig(
             system_id=self.first_id + index,
             flavour=self.flavour,
@@ -163,6 +163,7 @@ class Request:
             # ArduPilot's default BATT_LOW_VOLT of 10.5 V suits three cells; PX4's thresholds are relative.
             battery=BatteryConfig(cells=3 if self.flavour == "ardupilot" else 4),
             epoch=epoch,
+            streams="normal",
             **changes,
         )
 

@@ -82,7 +82,7 @@ def _listening(sources: Sequence[str], terms: Terms, opened: ExitStack) -> Liste
         opened.callback(link.close)
         places.append(place)
         links.append(link)
-    hint = f"Listening at {', '.join(map(str, places))}; nothing is sent."
+    hint = f"Listening at {', '.join(map(str, places))}; nothing is sent. (ArduPilot waits for requests.)"
     return Listener(links, [_whole(place) for place in places], terms.target, hint)
 
 
