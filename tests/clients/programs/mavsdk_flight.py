@@ -81,8 +81,8 @@ async def ask(drone: Drone) -> None:
         "gps_info": 2.0,
         "unix_epoch_time": 1.0,
     }
-    asked |= dict.fromkeys(("position", "velocity_ned", "attitude_euler", "attitude_quaternion"), 4.0)
-    asked["fixedwing_metrics"] = 4.0
+    asked |= dict.fromkeys(("position", "attitude_euler", "attitude_quaternion"), 4.0)
+    asked |= {"position_velocity_ned": 4.0, "fixedwing_metrics": 4.0}
     for name, rate in asked.items():
         await getattr(drone.telemetry, f"set_rate_{name}")(rate)
 
