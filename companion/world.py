@@ -29,6 +29,7 @@ from mavlink_bridge.messages import (
     AdsbVehicle,
     Attitude,
     CameraTrackingGeo,
+    GimbalAttitude,
     GlobalPosition,
     GpsGlobalOrigin,
     LocalPosition,
@@ -125,6 +126,8 @@ class World:
             self.neighbours.receive_plan(now, message)
         elif self.cameras is not None and isinstance(message, CAMERA_MESSAGES):
             self._receive_camera(now, link, message)
+        elif self.cameras is not None and isinstance(message, GimbalAttitude):
+            self.cameras.turned(self._own.when(now, message.time_boot), message)
         elif isinstance(self.target, Target) and (link == "target" or isinstance(message, CameraTrackingGeo)):
             self.target.receive(now, link, message)
         elif isinstance(message, ObstacleDistance):
@@ -297,6 +300,8 @@ class World:
                     self._last_in_old_frame = None
         elif isinstance(message, Attitude):
             self.stamp = message.time_boot
+            if self.cameras is not None:
+                self.cameras.turned(self._own.when(now, message.time_boot), message)
             if self._local is not None:
                 self._yaw = self._local.yaw_to_fleet(message.yaw)
                 self._yaw_time = self._own.when(now, message.time_boot)

@@ -74,6 +74,20 @@ class OwnErrors(Settings):
 _GNSS_ERRORS = OwnErrors()
 
 
+class Optics(Settings):
+    """Own camera that tells the target's place in its image (275), but not where it looked (271)."""
+
+    width_deg: float = Field(gt=0.0, lt=170.0, description="degrees, horizontal angle of view")
+    height_deg: float = Field(gt=0.0, lt=170.0, description="degrees, vertical angle of view")
+    pitch_deg: float = Field(
+        0.0,
+        ge=-90.0,
+        le=90.0,
+        description="degrees, optical axis below the nose of the vehicle; GIMBAL_DEVICE_ATTITUDE_STATUS"
+        " replaces it",
+    )
+
+
 class FusedSource(Settings):
     """Detections of the own camera and of the neighbours', fused."""
 
@@ -92,6 +106,11 @@ class FusedSource(Settings):
         ge=0,
         le=5_000_000,
         description="µs: age of a detection whose image's time (CAMERA_FOV_STATUS) is not sent",
+    )
+    optics: Optics | None = Field(
+        None,
+        description="of the own camera, if it sends CAMERA_TRACKING_IMAGE_STATUS without CAMERA_FOV_STATUS;"
+        " null: such detections are dropped",
     )
     height: float = Field(
         1.8, gt=0.0, le=100.0, description="m, of the target, for cameras that send its place in the image"
@@ -161,6 +180,8 @@ DETECTIONS = frozenset(
     }
 )
 """Messages of detections to be fused."""
+GIMBAL: int = mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
+"""Message that says where a camera with ``optics`` looks."""
 
 
 def sender_of(source: TargetSource, system: int, target: int) -> int | None:

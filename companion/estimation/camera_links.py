@@ -2,22 +2,33 @@
 
 CAMERA_FOV_STATUS (271) has the time of the image, on the clock of the vehicle's autopilot, and of a forwarded
 one on that of the vehicle's companion. It comes before the detection, in the same datagram. Without it the
-image is ``latency_us`` old, and the camera is where the vehicle was.
+image is ``latency_us`` old, and the camera is where the vehicle was; where a place in an image is then seen
+from follows from ``optics``, and without them such a detection is dropped.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from math import radians
 
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config.target_source import FusedSource
+from companion.estimation.camera_pose import CameraPose
 from companion.estimation.fused_target import FusedTarget
 from companion.estimation.tracks import State
+from companion.values.horizon import Array
 from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo, CameraTrackingImage, Source
+from mavlink_bridge.messages import (
+    Attitude,
+    CameraFovStatus,
+    CameraTrackingGeo,
+    CameraTrackingImage,
+    GimbalAttitude,
+    Source,
+)
 from mavlink_bridge.pinhole import Extent, Pinhole, sighting
 
 CAMERA_MESSAGES = (CameraFovStatus, CameraTrackingGeo, CameraTrackingImage)
@@ -37,6 +48,16 @@ class CameraLinks:
         self._source, self._fleet, self._target = source, fleet, target
         self._views: dict[Source, tuple[int, CameraFovStatus]] = {}
         self._stamps: dict[Source, deque[int]] = {}
+        self._pose = None if source.optics is None else CameraPose(source.optics)
+
+    def turned(self, time: int, message: Attitude | GimbalAttitude) -> None:
+        """Receive the attitude of the own vehicle or of its gimbal at ``time`` (µs)."""
+        if self._pose is None:
+            return
+        if isinstance(message, Attitude):
+            self._pose.receive_attitude(time, message)
+        else:
+            self._pose.receive_gimbal(time, message)
 
     def own(
         self,
@@ -53,14 +74,7 @@ class CameraLinks:
         if isinstance(message, CameraFovStatus):
             self._views[message.source] = now, message
             return
-        view = self._view(now, message.source)
-        if isinstance(message, CameraTrackingImage):
-            found = None if view is None else self._projected(view, message)
-            if found is None:
-                self._target.drop()
-                return
-            message = found
-        time = now - self._source.latency_us
+        view, time = self._view(now, message.source), now - self._source.latency_us
         if view is not None:
             taken = when(view.time_boot)
             if taken is None:
@@ -69,10 +83,26 @@ class CameraLinks:
             time = taken
         elif (own := vehicle()) is not None:
             place = own.position - 1e-6 * (now - time) * own.velocity
-            view = CameraFovStatus(
-                message.source, 0, self._fleet.to_geodetic(place), None, _FORWARD, 0.0, 0.0
-            )
+            view = self._assumed(time, message.source, place)
+        if isinstance(message, CameraTrackingImage):
+            found = None if view is None else self._projected(view, message)
+            if found is None:
+                self._target.drop()
+                return
+            message = found
         self._give(now, time, view, message)
+
+    def _assumed(self, time: int, source: Source, place: Array) -> CameraFovStatus:
+        """Return the field of view at ``time`` (µs) of a camera at ``place`` (3,), m, that does not tell it.
+
+        Its angles are 0 if they, or where it looked, are not known.
+        """
+        optics, where = self._source.optics, self._fleet.to_geodetic(place)
+        attitude = None if self._pose is None else self._pose.at(time)
+        if optics is None or attitude is None:
+            return CameraFovStatus(source, 0, where, None, _FORWARD, 0.0, 0.0)
+        fields = radians(optics.width_deg), radians(optics.height_deg)
+        return CameraFovStatus(source, 0, where, None, attitude, *fields)
 
     def forwarded(self, now: int, message: CameraMessage, when: Callable[[int], int | None]) -> None:
         """Receive a message that a neighbour forwards, at ``now`` (µs).

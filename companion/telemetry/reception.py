@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.config import CompanionConfig
 from companion.config.target_source import (
     DETECTIONS,
+    GIMBAL,
     CameraSource,
     FusedSource,
     message_of,
@@ -71,6 +72,8 @@ def accepts(
     reported, target_sender = message_of(source), sender_of(source, system, target)
     if link == "autopilot":
         camera = reported if isinstance(source, CameraSource) else None
+        if isinstance(source, FusedSource) and source.optics is not None:
+            detections |= {GIMBAL}
         return lambda identifier, sender, component: (
             (identifier in wanted and sender == system and component == mavlink.MAV_COMP_ID_AUTOPILOT1)
             or (identifier in sensors and sender == system)

@@ -66,16 +66,21 @@ class Sightings:
         Between messages the place is interpolated, and for ``_BEYOND_US`` after the last one extrapolated.
         Returns None before the first one, and later.
         """
-        places = self._places.get(system, ())
-        after = next((one for one in places if one[0] >= time), None)
+        after: tuple[int, Point] | None = None
+        # Images are of a moment ago: from the newest on.
+        for one in reversed(self._places.get(system, ())):
+            if one[0] < time:
+                break
+            after = one
+        else:
+            return after[1] if after is not None and after[0] == time else None
         if after is None:
             return self._beyond(system, time)
         if after[0] == time:
             return after[1]
-        before = next((one for one in reversed(places) if one[0] < time), None)
-        if before is None or after[0] - before[0] > _BEYOND_US:
+        if after[0] - one[0] > _BEYOND_US:
             return None
-        return _between(before, after, time)
+        return _between(one, after, time)
 
     def bodies(self, time: int) -> list[Body]:
         """Return all bodies that may hide the target at ``time`` (µs)."""

@@ -11,6 +11,7 @@ from mavlink_bridge.messages import (
     CameraTrackingGeo,
     CameraTrackingImage,
     CommandLong,
+    GlobalPosition,
     HilState,
     Message,
     Source,
@@ -77,6 +78,10 @@ def test_a_camera_that_speaks_of_its_image_alone_is_known_by_its_optics() -> Non
     assert found(verdict, "CAMERA_TRACKING_IMAGE_STATUS (275) alone").severity is NOTE
     assert found(verdict, "does not tell where it looks").severity is NOTE
     assert not [finding for finding in verdict.findings if "optics" in finding.what]
+    optics = found(verdict, "does not tell its angles of view with its images")
+    assert optics.severity is NOTE
+    # 1280 × 720 pixels, 70° across.
+    assert "target_source.optics: {width_deg: 70.0, height_deg: 43.0}" in optics.do
     asked = [m for m in rig.received if isinstance(m, CommandLong) and m.target_component == 100]
     assert [m.params[0] for m in asked] == [259.0]
 
@@ -133,3 +138,33 @@ def test_another_clock_than_the_autopilots_is_a_warning(stamp: int) -> None:
     rig.run(5.0)
     finding = found(rig.consult(beside=frames(geo, view)), "camera 11/101 has another clock")
     assert finding.severity is WARNING
+
+
+VIEW = CameraFovStatus(Source(12, 191), 1000, (47.0, 8.0, 400.0), None, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+SEEN = CameraTrackingGeo(Source(12, 191), 1, 47.0, 8.0, 400.0, None, 0.5, 0.5, None, 8.0, 0.0, 0.01)
+THERE = GlobalPosition(Source(12, 191), 1000, 47.0, 8.0, 400.0, 5.0, (0.0, 0.0, 0.0), None)
+
+
+def test_what_another_vehicle_forwards_is_judged_as_companions_use_it() -> None:
+    whole = found(bench().consult(beside=frames(THERE, VIEW, SEEN)), "forwarder 12/191 of another vehicle")
+    assert whole.severity is OK
+    assert "(276) at 5 Hz, with all accuracies" in whole.what
+    bare = SEEN._replace(vertical_accuracy=None)
+    assert found(bench().consult(beside=frames(THERE, VIEW, bare)), "without v_acc").severity is WARNING
+    undated = bench().consult(beside=frames(THERE, SEEN))
+    assert found(undated, "forwarder 12/191 tells of a target, but not as").severity is WARNING
+    assert found(undated, "camera 11/100 speaks").severity is OK
+
+
+@pytest.mark.parametrize("component", [100, 191])
+def test_a_camera_with_the_id_of_no_vehicle_is_a_warning(component: int) -> None:
+    said = SEEN._replace(source=Source(77, component))
+    finding = found(bench().consult(beside=frames(said)), f"77/{component} has the system id of no vehicle")
+    assert finding.severity is WARNING
+    assert "(here 11)" in finding.do
+
+
+def test_detections_of_another_component_of_the_vehicle_are_a_forwarders() -> None:
+    verdict = bench().consult(beside=frames(SEEN._replace(source=Source(11, 191))))
+    assert found(verdict, "forwarder 11/191 speaks CAMERA_TRACKING_GEO_STATUS (276)").severity is OK
+    assert found(verdict, "forwarder 11/191 does not tell when its images were taken").severity is NOTE

@@ -1,8 +1,13 @@
-"""Cameras of the vehicle: what they say about a tracked target, how accurate, and of what time."""
+"""Cameras of the vehicle: what they say about a tracked target, how accurate, and of what time.
+
+Detections may also come through a forwarder: another component of the vehicle, or another vehicle's
+companion.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import atan, degrees
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -25,6 +30,8 @@ _FOV: Final[int] = mavlink.MAVLINK_MSG_ID_CAMERA_FOV_STATUS
 _ATTITUDE: Final[int] = mavlink.MAVLINK_MSG_ID_ATTITUDE
 _GIMBAL: Final[int] = mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
 _SAID_BY_CAMERAS: Final = frozenset((_GEO, _IMAGE, _FOV, mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION))
+_POSITION: Final[int] = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+_CAMERAS: Final = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
 _MAX_LATENCY_S: Final = 5.0
 """An image that seems older than this (s), or newer than now, has a stamp of another clock."""
 _ALLOWED_LEAD_S: Final = 0.05
@@ -37,9 +44,10 @@ def cameras_of(hearing: Hearing, system: int) -> list[SenderRecord]:
 
 
 def cameras(case: Case) -> Iterator[Finding]:
-    """Yield what each camera of the vehicle says; nothing without a camera."""
+    """Yield what each camera of the vehicle says, and what others tell of targets; nothing without any."""
+    yield from _from_others(case)
     for camera in cameras_of(case.hearing, case.vehicle.source.system):
-        name = "camera {}/{}".format(*camera.source)
+        name = _name(camera)
         if _GEO in camera.streams:
             yield _geo(name, camera)
         if _IMAGE in camera.streams:
@@ -54,6 +62,43 @@ def cameras(case: Case) -> Iterator[Finding]:
                 " Many cameras send them only while they track something, and after a request.",
                 "Let it track something in view, and examine it again.",
             )
+
+
+def _name(sender: SenderRecord) -> str:
+    beat = sender.heartbeat
+    camera = beat is not None and beat.type == mavlink.MAV_TYPE_CAMERA
+    kind = "camera" if camera or sender.source.component in _CAMERAS else "forwarder"
+    return "{} {}/{}".format(kind, *sender.source)
+
+
+def _from_others(case: Case) -> Iterator[Finding]:
+    """Yield what senders with another system id than the vehicle's tell of targets."""
+    senders, own = case.hearing.senders, case.vehicle.source.system
+    vehicles = {
+        source.system for source, one in senders.items() if one.is_autopilot or _POSITION in one.streams
+    }
+    for source, one in sorted(senders.items()):
+        speaks = [message for message in (_GEO, _IMAGE) if message in one.streams]
+        if source.system == own or not speaks:
+            continue
+        if source.system not in vehicles:
+            yield Finding(
+                f"{_name(one)} has the system id of no vehicle",
+                Severity.WARNING,
+                "A detection counts under the id of the vehicle that made it. Those of the own camera have"
+                f" the id {own}; those on the swarm link that of a vehicle whose companion reports a place.",
+                f"Give the camera, or what forwards its messages, the vehicle's system id (here {own}).",
+            )
+        elif _GEO not in speaks or _FOV not in one.streams:
+            yield Finding(
+                f"{_name(one)} tells of a target, but not as companions need it",
+                Severity.WARNING,
+                "Of another vehicle counts CAMERA_TRACKING_GEO_STATUS (276) with CAMERA_FOV_STATUS (271)"
+                " before it in the same datagram, which has the time of the image and the camera's place.",
+                "Send both, as a companion with target_source.share does.",
+            )
+        else:
+            yield _geo(f"{_name(one)} of another vehicle", one)
 
 
 def _is_camera(sender: SenderRecord) -> bool:
@@ -112,17 +157,32 @@ def _image(name: str, camera: SenderRecord, case: Case) -> Iterator[Finding]:
             f"{name} does not tell where it looks",
             Severity.NOTE,
             "Neither CAMERA_FOV_STATUS (271) nor GIMBAL_DEVICE_ATTITUDE_STATUS (285) comes.",
-            "Nothing, if it is fixed to the vehicle; otherwise have its gimbal send its attitude.",
+            "If it is fixed to the vehicle, state its target_source.optics.pitch_deg; otherwise have its"
+            " gimbal send its attitude.",
         )
+    if alone and _FOV not in camera.streams:
+        yield _optics(name, camera)
+
+
+def _optics(name: str, camera: SenderRecord) -> Finding:
+    """Return the finding about the angles of view of a camera that does not send them with its images."""
     about = camera.latest(CameraInformation)
-    known = about is not None and about.focal_length and about.sensor_size
-    if alone and not known and _FOV not in camera.streams:
-        yield Finding(
+    if about is None or not about.focal_length or not about.sensor_size:
+        return Finding(
             f"{name} does not tell its optics",
             Severity.WARNING,
-            "Without focal length and sensor size, or angles of view, a place in the image has no direction.",
-            "Set the angles of view in the companion's settings.",
+            "Without angles of view, a place in the image has no direction: its detections are dropped.",
+            "State width_deg and height_deg of target_source.optics in the companion's settings.",
         )
+    across, down = (degrees(2.0 * atan(0.5 * side / about.focal_length)) for side in about.sensor_size)
+    return Finding(
+        f"{name} does not tell its angles of view with its images",
+        Severity.NOTE,
+        "CAMERA_FOV_STATUS (271) does not come. Without target_source.optics the companion drops its"
+        " detections.",
+        f"State target_source.optics: {{width_deg: {across:.1f}, height_deg: {down:.1f}}}, by its"
+        " CAMERA_INFORMATION (259).",
+    )
 
 
 def _turns(case: Case) -> bool:
@@ -142,7 +202,7 @@ def _time(name: str, camera: SenderRecord, case: Case) -> Finding:
             Severity.NOTE,
             "Its messages have no time stamp, and CAMERA_FOV_STATUS (271), which has one, does not come. A"
             " target that moves at 3 m/s is 0.6 m further after 200 ms.",
-            "State the camera's latency in the companion's settings.",
+            "State the camera's latency in the companion's settings (target_source.latency_us).",
         )
     if latency is None:
         return Finding(f"{name} tells when its images were taken", Severity.OK, "By CAMERA_FOV_STATUS (271).")
