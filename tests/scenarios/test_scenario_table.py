@@ -41,8 +41,13 @@ ROWS = (
     Row("escort, 10 s", "escort", {"target": {"duration_s": 10.0}}, standoff_p95_m=2.0),
     # 16 m from rest to rest with 2 m/s² take 5.7 s: a cap of 5 s is never enough.
     Row("antipodal, baseline", "antipodal-8", {"vehicles": 3, "cap_s": 5.0, **BASELINE}, within_s=0.0),
-    Row("antipodal, planar", "antipodal-8", {"vehicles": 3, **PLANAR}, seed=2, within_s=20.0),
-    Row("ArduPilot", "antipodal-8", {"vehicles": 3, "flavour": "ardupilot"}, seed=3, within_s=20.0),
+    Row(
+        "ArduPilot, planar",
+        "antipodal-8",
+        {"vehicles": 3, "flavour": "ardupilot", **PLANAR},
+        seed=2,
+        within_s=20.0,
+    ),
     Row("PX4", "antipodal-8", {"vehicles": 3, "flavour": "px4"}, seed=3, within_s=20.0),
     Row("alone", "antipodal-8", {"vehicles": 1}, within_s=12.0),
 )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from companion.flight.autopilots import Inverse, Loop, Shaping
@@ -119,6 +119,7 @@ def test_nothing_is_added_at_rest_and_at_a_constant_speed_in_the_end() -> None:
     assert not any(one.any() for one in added)
 
 
+@settings(max_examples=25)
 @given(seeds, st.floats(-3.2, 3.2))
 def test_it_turns_with_the_plan_and_leaves_the_height(seed: int, angle: float) -> None:
     c, s = np.cos(angle), np.sin(angle)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -102,6 +103,9 @@ def test_a_scenario_that_is_not_shipped_is_refused_with_those_that_are(here: Pat
 
 def test_a_scene_has_what_the_picture_needs() -> None:
     (cell,) = (one for one in cells_of(showings(("scenario-3",))) if one.label.endswith("tangential"))
+    document = json.loads(cell.document)
+    document["companion"]["rates"]["replan_us"] = 50_000
+    cell = cell._replace(document=json.dumps(document))
     summary = fly(task(cell, 1))
     scene = summary["scene"]
     assert summary["converged"] is True

@@ -9,7 +9,7 @@ import json
 from collections.abc import Callable
 from math import hypot
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -162,13 +162,18 @@ MUTANTS: dict[str, tuple[Callable[[SetpointLocal, int], SetpointLocal], str]] = 
     "another frame": (swapped, "beside the vehicle"),
     "half a second off": (late, "beside the vehicle"),
     "velocities the other way": (falling, "velocities that lead"),
-    "too fast": (lambda m, n: m._replace(velocity=(9.0, 0.0, 0.0)) if n == 500 else m, "faster than"),
-    "too hard": (lambda m, n: m._replace(acceleration=(5.0, 5.0, 0.0)) if n == 500 else m, "more than 4.0"),
     "a jump": (jumping, "a jump of 0."),
+}
+SINGLE: dict[int, tuple[dict[str, Any], str]] = {
+    350: ({"velocity": (9.0, 0.0, 0.0)}, "faster than"),
+    400: ({"acceleration": (5.0, 5.0, 0.0)}, "more than 4.0"),
+    450: ({"yaw_rate": 9.0}, "turning faster"),
+    500: ({"type_mask": 0x9C0}, "type masks other than 0x000"),
+    550: ({"frame": 8}, "frames other than 1"),
+}
+"""Faults of one message each, by its number. Each has words of its own, so one flight has them all."""
+MUTANTS |= {
     "the nose turned": (lambda m, n: m._replace(yaw=m.yaw + 0.5 * (n == 500)), "rad"),
-    "spinning": (lambda m, n: m._replace(yaw_rate=9.0) if n == 500 else m, "turning faster"),
-    "a mask": (lambda m, n: m._replace(type_mask=0x9C0) if n == 500 else m, "type masks other than 0x000"),
-    "a frame number": (lambda m, n: m._replace(frame=8) if n == 500 else m, "frames other than 1"),
     "not a number": (
         lambda m, n: m._replace(velocity=(float("nan"), 0.0, 0.0)) if n == 500 else m,
         "not all are finite",
@@ -182,6 +187,30 @@ def test_what_is_not_sound_is_found_out(
 ) -> None:
     """A companion with a fault in what it sends, one at a time; and one without."""
     mutant, words = MUTANTS[name]
+    ended, wrong = mutated_run(mutant, piece, run, monkeypatch)
+    assert ended.status == (1 if words else 0)
+    assert any(words in line for line in wrong) if words else not wrong
+
+
+def test_what_is_not_sound_in_single_messages_is_found_out(
+    piece: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def spoilt(message: SetpointLocal, count: int) -> SetpointLocal:
+        return message._replace(**SINGLE[count][0]) if count in SINGLE else message
+
+    ended, wrong = mutated_run(spoilt, piece, run, monkeypatch)
+    assert ended.status == 1
+    for _, words in SINGLE.values():
+        assert any(words in line for line in wrong), words
+
+
+def mutated_run(
+    mutant: Callable[[SetpointLocal, int], SetpointLocal],
+    piece: Path,
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+) -> tuple[Ended, list[str]]:
+    """A dry run with changed set-points, and its lines on what is wrong."""
     count = 0
 
     def mutated(*arguments: object) -> SetpointLocal:
@@ -192,9 +221,7 @@ def test_what_is_not_sound_is_found_out(
     monkeypatch.setattr(setpoints, "setpoint", mutated)
     monkeypatch.setattr(setpoints, "is_finite", lambda _message: True)
     ended = dry_run_of_log(run, piece, "ardupilot", 9)
-    wrong = [line for line in ended.err.splitlines() if line.startswith("wrong: ")]
-    assert ended.status == (1 if words else 0)
-    assert any(words in line for line in wrong) if words else not wrong
+    return ended, [line for line in ended.err.splitlines() if line.startswith("wrong: ")]
 
 
 def test_who_would_have_sent_nothing_is_not_well(piece: Path, run: Run, tmp_path: Path) -> None:

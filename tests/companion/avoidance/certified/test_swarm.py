@@ -150,9 +150,8 @@ def test_seeded_flights_are_apart_and_get_somewhere(rough: Rough) -> None:
 
 def test_these_flights_are_close_ones() -> None:
     """They come as near as they may, or the laws are idle."""
-    least = [flown(Rough(), seed).least() for seed in range(6)]
-    d = flown(Rough(), 0).d
-    assert min(least) < d + 0.02
+    flights = [flown(Rough(), seed) for seed in range(6)]
+    assert min(flight.least() for flight in flights) < flights[0].d + 0.02
 
 
 @pytest.mark.parametrize(
