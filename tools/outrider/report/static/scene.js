@@ -22,13 +22,14 @@ function scene(g, time) {
   if (run.cameras && show.cameras) places.forEach((point, k) => point && sight(g, add, point, k, here));
   inOrder(g, things);
   if (show.ids) places.forEach((point, k) => point && label(g, point, String(flight.systems[k]), labelColourOf(k)));
-  if (show.ids && target) label(g, target, "target", ink["label-target"]);
+  if (show.ids && target) label(g, target, "target", ink["label-target"], 1);
   return pair;
 }
 
-function label(g, point, text, colour) {
+// Vehicles have theirs above (side -1) and the target below it (1), so that those of a vehicle in front stay legible.
+function label(g, point, text, colour, side = -1) {
   const seen = project(point);
-  if (seen) words(g, text, seen[0], seen[1] - Math.max(19, 0.55 * pixelsPerMetre(seen[2])), colour);
+  if (seen) words(g, text, seen[0], seen[1] + side * Math.max(19, 0.55 * pixelsPerMetre(seen[2])), colour);
 }
 
 // A grid on the ground with its scale along two edges.
