@@ -67,6 +67,14 @@ class GuardConfig(Settings):
         description="m/s: a vehicle near an unheard neighbour is no faster on each axis, and the distances to"
         " that neighbour grow at this rate, until neighbour_lost_us",
     )
+    unheard_wait_us: int = Field(
+        15_000_000,
+        ge=0,
+        le=600_000_000,
+        description="µs: with unheard_us a vehicle does not approach the places that a neighbour may have"
+        " reached at unheard_speed since it was heard, until it has been silent for longer; then it counts as"
+        " gone",
+    )
     late_us: Micros = Field(100_000, description="µs: a step that is later is a missed deadline")
     battery_low: float = Field(
         0.2, ge=0.0, le=1.0, description="share left below which the vehicle returns and lands"

@@ -6,25 +6,29 @@ unheard neighbour may be: a ball around its last course that grows with ``guard.
 to rest outside the ball of the other, and near it is as slow as the ball grows. This is a rule of the field:
 it makes violations rare, and proves nothing.
 
-The ball stops growing at ``guard.neighbour_lost_us``: a vehicle that is gone must not hold up the others for
-ever. Approaching it after that is slow, because the ball stays.
+The field's distances stop growing at ``guard.neighbour_lost_us``. The ball that the vehicle does not approach
+grows until ``guard.unheard_wait_us``: the neighbour may fly on while it hears nothing either. As long as that
+the vehicle also stops before the plane in the middle between the places of both at that one's last message
+(``middle_planes``). After that the neighbour counts as gone, because it must not hold up the others for ever,
+and the smaller ball stays.
 """
 
 from __future__ import annotations
 
-from math import inf
+from math import exp, inf
 
 import numpy as np
 
 from companion.config import CompanionConfig
+from companion.obstacles.middle_planes import MiddlePlanes
 from companion.obstacles.reachable_ball import norms
 from companion.obstacles.relevance_filter import Ages
 from companion.values.horizon import Array
 
 _REACTION_S = 0.2
 """s at the present speed before a vehicle brakes: a plan, a set-point, and the tilt."""
-_FORGOTTEN = 0.1
-"""Share of time by which a remembered silence becomes shorter: one of 1 s is forgotten in 10 s."""
+_MEMORY_US = 5e6
+"""µs in which a remembered silence becomes shorter by the factor e."""
 _LEVEL = 1e-9
 
 
@@ -34,10 +38,13 @@ class Unheard:
     def __init__(self, config: CompanionConfig) -> None:
         guard, field = config.guard, config.field
         self._after = guard.unheard_us or 0
-        self._most = max(guard.neighbour_lost_us - self._after, 0)
+        self._lost = guard.neighbour_lost_us
+        self._waits = guard.unheard_wait_us
         self._growth = guard.unheard_speed
         self._d_min = field.d_min + field.margin(2)
         self._scale = np.array([1.0, 1.0, 1.0 / field.downwash])
+        # Both stop before the plane: 2 d_min apart.
+        self._planes = MiddlePlanes(self._d_min, self._scale)
         self._braking = min(config.limits.u_max)
         self._horizon_s = 1e-6 * config.horizon.dt_us * (config.horizon.steps + 1)
         # The longest silence (µs) of each neighbour, as far as it is remembered, at the last call.
@@ -45,9 +52,17 @@ class Unheard:
         self._called = 0
 
     def radii(self, ages: Ages | Array) -> Array:
-        """Return by how much (m) neighbours may be beside their last course, (M,); 0 for those just heard."""
+        """Return by how much (m) the field's distances to neighbours grow, (M,); 0 for those just heard."""
+        return self._grown(np.minimum(ages, self._lost))
+
+    def _reached(self, ages: Ages) -> Array:
+        """Return how far (m) neighbours may be beside their last course, (M,); the wait for them included."""
+        return self._grown(np.where(ages <= self._waits, ages, np.minimum(ages, self._lost)))
+
+    def _grown(self, ages: Ages | Array) -> Array:
+        """Return the radius (m) of a ball that grows for ``ages`` (M,), µs."""
         silent = np.asarray(ages - self._after, dtype=np.float64)
-        return np.asarray(1e-6 * self._growth * np.clip(silent, 0.0, self._most))
+        return np.asarray(1e-6 * self._growth * np.maximum(silent, 0.0))
 
     def pace(self, now: int, ages: Ages, here: Array, place: Array, towards: Array) -> float:
         """Return the speed (m/s) at which a vehicle at ``place`` (3,) may fly ``towards`` (3,), both m.
@@ -56,21 +71,34 @@ class Unheard:
         each unheard one, and near it flies no faster than the ball grows. Returns ∞ if there are none in this
         direction.
         """
+        self._planes.note(now, ages, here, place)
         off, gap = self._gaps(now, ages, here, place)
         size = float(np.sqrt(towards @ towards))
         if size < _LEVEL:
             return inf
+        planes = self._beside_planes(ages, place, towards / size)
         closing = off @ (towards * self._scale) / (size * np.maximum(norms(off), _LEVEL))
         ahead = closing > 0.0
         if not ahead.any():
-            return inf
-        # The neighbour, too, comes nearer while this vehicle brakes.
-        reach = self._braking * _REACTION_S
+            return planes
         gap = np.maximum(gap[ahead], 0.0)
-        stopping = np.sqrt(reach * reach + 2.0 * self._braking * gap) - reach
         # Faster than the ball grows it flies only where a plan does not reach the ball.
-        speeds = np.minimum(stopping, np.maximum(self._growth, gap / self._horizon_s - self._growth))
-        return float(np.min(speeds / closing[ahead]))
+        near = np.maximum(self._growth, gap / self._horizon_s - self._growth)
+        return min(planes, float(np.min(np.minimum(self._stopping(gap), near) / closing[ahead])))
+
+    def _beside_planes(self, ages: Ages, place: Array, direction: Array) -> float:
+        """Return the speed (m/s) in ``direction`` (3,) at which it can stop before the middle planes."""
+        silent = (ages > self._after) & (ages <= self._waits)
+        gap, closing = self._planes.gaps(silent, place, direction)
+        ahead = closing > 0.0
+        if not ahead.any():
+            return inf
+        return float(np.min(self._stopping(np.maximum(gap[ahead], 0.0)) / closing[ahead]))
+
+    def _stopping(self, gap: Array) -> Array:
+        """Return the speeds (m/s) from which a vehicle comes to rest within ``gap`` (K,), m."""
+        reach = self._braking * _REACTION_S
+        return np.asarray(np.sqrt(reach * reach + 2.0 * self._braking * gap) - reach)
 
     def confined(self, now: int, ages: Ages, here: Array, place: Array, speed: float) -> bool:
         """Return whether a vehicle at ``place`` (3,), m, has to be slow: no faster than the balls grow.
@@ -89,16 +117,18 @@ class Unheard:
         silences = self._silence(now, ages)
         unheard = silences > self._after
         off = (here[unheard] - place) * self._scale
-        return off, norms(off) - self._d_min - self.radii(silences[unheard])
+        return off, norms(off) - self._d_min - self._reached(ages[unheard])
 
     def _silence(self, now: int, ages: Ages) -> Array:
         """Return the present or the longest recent silence (M,), µs, of neighbours whose ages grow.
 
         A link that lost everything for a second may do so again: a neighbour heard just now is approached as
-        one that falls silent now.
+        one that falls silent now. A long silence is remembered hardly longer than a short one: at most
+        ``guard.neighbour_lost_us`` of it counts.
         """
         before = np.zeros(len(ages))
-        before[: len(self._silences)] = self._silences - _FORGOTTEN * (now - self._called)
+        kept = np.minimum(self._silences, self._lost)
+        before[: len(kept)] = kept * exp((self._called - now) / _MEMORY_US)
         self._called = now
         self._silences = np.maximum(ages.astype(np.float64), before)
         return self._silences

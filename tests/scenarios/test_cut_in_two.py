@@ -1,0 +1,27 @@
+"""A swarm whose link is cut in two while it crosses: with ``guard.unheard_us`` nobody comes too near."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.scenarios.lockstep_flights import fly, scenario
+
+CUT = {
+    "airborne": True,
+    "cap_s": 10.0,
+    "partitions": [{"at_s": 1.0, "for_s": 5.0, "members": [11, 12, 13, 14]}],
+    "companion": {"guard": {"unheard_us": 300_000}},
+}
+
+
+@pytest.mark.slow
+def test_opposite_vehicles_that_are_cut_off_from_each_other_wait(tmp_path: Path) -> None:
+    """The cut is longer than a lost neighbour's ball grows: 14 and 18 met after it had stopped."""
+    flown = fly(scenario("antipodal-8", CUT), 1001, tmp_path)
+    assert flown.flight.conductor.failure is None
+    assert flown.summary["d_min_violations"] == 0
+    nearest = flown.summary["min_separation_m"]
+    assert isinstance(nearest, float)
+    assert nearest > 0.5
