@@ -157,6 +157,19 @@ class CertifiedConfig(Settings):
     fleet: tuple[SystemId, ...] = Field(
         (), max_length=255, description="system ids that take part: no vehicle moves before all are received"
     )
+    range: Positive | None = Field(
+        None,
+        description="m, true distance up to which two vehicles are certain to hear each other in"
+        " ``contact_us``; who is beyond needs no agreement, and all plans are so short that nobody is met"
+        " unheard; the same for the whole fleet, which begins and ends in the air; null: all agree with all",
+    )
+    contact_us: int = Field(
+        500_000,
+        gt=0,
+        le=10_000_000,
+        description="µs within ``range`` after which each of two vehicles has received the other's plan and"
+        " statement",
+    )
     noncooperative_speed: Positive = Field(1.0, description="m/s, of those that share no plan")
     noncooperative_acceleration: Positive = Field(1.0, description="m/s², of those that share no plan")
     omega_end: Positive = Field(30.0, description="weight of where the plan comes to rest")

@@ -8,6 +8,8 @@ agreement before it has begun anew.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from companion.avoidance.certified.committed import horizon_of
@@ -36,19 +38,31 @@ Nothing of a sender of another fleet is accepted in this time.
 class Agreements:
     """Agreements of the vehicle ``own`` (system id) in a ``fleet``.
 
+    ``beyond``: test whether a plan, at a time (µs), shows that its vehicle is beyond the range; None: there
+    is no range. With a range, peers are those that were last heard within it, the expected ones and those
+    that others name are none, and those that were heard beyond it are kept apart: they cost nothing.
     ``steps``: number of knots of every plan. ``since``: epoch (µs) of the first plan since which each own
     plan began on the one before; it changes when the vehicle returns, not at its farewell. ``refused`` counts
     the messages that were not accepted.
     """
 
     def __init__(
-        self, own: int, config: CertifiedConfig, steps: int, fleet: FleetIdentity, geometry: Geometry
+        self,
+        own: int,
+        config: CertifiedConfig,
+        steps: int,
+        fleet: FleetIdentity,
+        geometry: Geometry,
+        beyond: Callable[[int, StoredPlan], bool] | None = None,
     ) -> None:
         self.own = own
         self._config, self._steps, self._fleet = config, steps, fleet
         self._plans = PlanFile()
         self._negotiation = Negotiation(self._plans, steps, geometry)
-        self._peers = {system: Peer(own, system) for system in set(config.fleet) - {own}}
+        self._beyond = beyond
+        expected = set(config.fleet) - {own} if beyond is None else ()
+        self._peers = {system: Peer(own, system) for system in expected}
+        self._distant: dict[int, Peer] = {}
         self._members: frozenset[int] | None = None
         self._foreign: dict[int, int] = {}
         self._other_knots: dict[int, int] = {}
@@ -64,10 +78,11 @@ class Agreements:
         settings (frame, dt, steps, epoch), is too far from ``now``, or differs from the stored plan of its
         epoch.
         """
-        peer = self._peers.get(system)
+        peer = self._peers.get(system) or self._distant.get(system)
         if peer is not None and peer.last_payload == payload:
             # Most payloads repeat the last one.
             peer.last_received = now
+            self._place(now, peer)
             return
         if system == self.own:
             return
@@ -85,8 +100,24 @@ class Agreements:
             peer.last_payload = payload
             if departed and peer.left is None:
                 self._members = None
+            self._place(now, peer)
         else:
             self.refused += 1
+
+    def _place(self, now: int, peer: Peer) -> None:
+        """Count a ``peer`` that was heard, unless its newest plan shows that it is beyond the range."""
+        if self._beyond is None:
+            return
+        system, plan = peer.pair.peer, peer.plans.newest
+        if plan is not None and self._beyond(now, plan):
+            if system in self._peers:
+                peer.part()
+                self._distant[system] = self._peers.pop(system)
+                self._members = None
+        elif system in self._distant:
+            peer.meet()
+            self._peers[system] = self._distant.pop(system)
+            self._members = None
 
     def _fits(self, now: int, system: int, plan: WirePlan) -> bool:
         """Return whether a plan is in the fleet's frame, on its knots, and of about ``now`` (µs)."""
@@ -114,8 +145,11 @@ class Agreements:
             self._refuse_fleet(now, system)
         elif not self._begun(now, system, max(statement.epoch, statement.since)):
             self.refused += 1
-        elif self._known(system).receive(now, statement, self.since if self._farewell is None else 0):
-            self._members = None
+        else:
+            peer = self._known(system)
+            if peer.receive(now, statement, self.since if self._farewell is None else 0):
+                self._members = None
+            self._place(now, peer)
 
     def _refuse_fleet(self, now: int, system: int) -> None:
         """Refuse a statement of another fleet.
@@ -139,9 +173,13 @@ class Agreements:
         return system not in self._peers and system in _recent(self._differing, now)
 
     def _known(self, system: int) -> Peer:
+        if system in self._distant:
+            return self._distant[system]
         if system not in self._peers:
-            self._peers[system] = Peer(self.own, system)
+            self._peers[system] = Peer(self.own, system, parts=self._beyond is not None)
             self._members = None
+            if self._beyond is not None:
+                self._peers[system].meet()
         return self._peers[system]
 
     def begin(self, since: int) -> None:
@@ -196,7 +234,7 @@ class Agreements:
         """System ids of the peers that need an agreement: all known ones that have not said farewell."""
         if self._members is None:
             known = set(self._peers)
-            for peer in self._peers.values():
+            for peer in self._peers.values() if self._beyond is None else ():
                 known.update(system for system, departed in peer.names.items() if not departed)
             self._members = frozenset(known) - {self.own} - self.left.keys()
         return self._members
@@ -345,9 +383,12 @@ class Agreements:
         """Return the peers to state, by system id.
 
         They are the expected ones and those that have the fleet's fingerprint. One of which only plans were
-        received may be of another fleet, and receivers of its name would wait for it.
+        received may be of another fleet, and receivers of its name would wait for it. With a range nobody
+        does: all are stated.
         """
         known = sorted(self._peers.items())
+        if self._beyond is not None:
+            return [peer for _, peer in known]
         return [peer for system, peer in known if peer.stated or system in self._config.fleet]
 
     def refused_senders(self, now: int) -> RefusedSenders:

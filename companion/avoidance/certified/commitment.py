@@ -24,6 +24,7 @@ from companion.avoidance.certified.committed import (
 from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
 from companion.avoidance.certified.qp import Objective, SeparationQp, State
 from companion.avoidance.certified.separating_planes import Others, kept, planes
+from companion.avoidance.certified.vicinity import region, within_region
 from companion.config.certified import CertifiedConfig
 from companion.errors import CertificateError, CompanionError, SolverError
 from companion.values.horizon import Array, Horizon, Motion
@@ -46,6 +47,7 @@ class Commitment:
     An epoch (µs) is a whole number of knots. ``program`` solves for plans, and each solved plan updates
     ``deadlock_turn``. ``origin``: fingerprint of the fleet frame, for the wire. ``held`` counts, by reason,
     how often the plan was carried on; ``anchored_anew`` how often planning restarted at the measured motion.
+    ``sides`` (3,), m: of the box that holds a plan; None: no box but that of the limits.
     """
 
     def __init__(
@@ -56,8 +58,9 @@ class Commitment:
         origin: int,
         *,
         planar: bool = False,
+        sides: Array | None = None,
     ) -> None:
-        self._config, self._program, self._origin = config, program, origin
+        self._config, self._program, self._origin, self._sides = config, program, origin, sides
         self._deadlock_turn = deadlock_turn
         self._planar = planar
         self._rounding = rounding(program.n, config.dt_us)
@@ -185,6 +188,7 @@ class Commitment:
         state = State(
             start.position_m, start.velocity_m_s, self._last_acceleration(), start.accelerations_m_s2
         )
+        box = None if self._sides is None else region(own, goal.place, self._sides - 2.0 * float(np.max(self._rounding)))
         # Rounding may violate a plane that is only just kept: the second attempt adds the rounding error.
         reason = HoldReason.UNSOLVED
         for attempt in range(2):
@@ -192,13 +196,13 @@ class Commitment:
                 wanted = np.maximum(corridor.wanted, corridor.least + self._rounding)
                 corridor = corridor._replace(wanted=wanted)
             try:
-                answer = self._program.solve(state, objective, corridor)
+                answer = self._program.solve(state, objective, corridor, box)
                 plan, points = committed_with_controls(start, answer.accelerations)
             except (SolverError, CertificateError):
                 continue
             reason = HoldReason.ROUNDING
             # The rounded plan is checked, because the others receive the rounded one.
-            if kept(corridor, points):
+            if kept(corridor, points) and self._compact(own, points):
                 ways = np.zeros(answer.forces.shape)
                 ways[: len(others.controls)] = others.controls[:, -1, 2] - others.controls[:, 0, 0]
                 pushes = Pushes(answer.forces, ways / (1e-6 * self._config.dt_us * self._program.n))
@@ -212,6 +216,10 @@ class Commitment:
                 return True
         self.carry_on(reason)
         return False
+
+    def _compact(self, own: Array, points: Array) -> bool:
+        """Return whether the plan ``points`` may replace the plan ``own`` (n, 3, 3), m, by its length."""
+        return self._sides is None or within_region(own, points, self._sides)
 
     def anchor(self, now: int, measured: Motion) -> int:
         """Plan the next epoch anew from the ``measured`` motion, to rest; return its beginning (µs).

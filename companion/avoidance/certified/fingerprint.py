@@ -27,6 +27,8 @@ _RULES = 2
 _NANO, _MICRO = 1e9, 1e6
 """Units of angles (1e-9 °: 0.1 mm), and of lengths, speeds and k (1e-6 of the SI unit)."""
 _UTC, _OWN = 0, -1
+_RANGE = -2
+"""Mark before the numbers of a limited range, which are left out without one."""
 
 
 class FleetIdentity(NamedTuple):
@@ -65,6 +67,8 @@ def fingerprint(config: CompanionConfig, frame: FleetFrame) -> int:
     if field.downwash != 1.0:
         # A ball is left out: its fingerprint is that of fleets from before this setting.
         numbers.append(round(field.downwash * _MICRO))
+    if certified.range is not None:
+        numbers += [_RANGE, round(certified.range * _MICRO), certified.contact_us]
     members = sum(1 << system for system in set(certified.fleet))
     data = b"".join(number.to_bytes(8, "little", signed=True) for number in numbers)
     return crc32(data + members.to_bytes(32, "little"))

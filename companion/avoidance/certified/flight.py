@@ -18,8 +18,10 @@ from companion.avoidance.certified.detour import Detour
 from companion.avoidance.certified.fingerprint import identity
 from companion.avoidance.certified.margins import beside, from_surfaces, further
 from companion.avoidance.certified.negotiation import Geometry
+from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.reservation import Reservation
+from companion.avoidance.certified.vicinity import Vicinity, plan_sides
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
@@ -52,8 +54,16 @@ class CertifiedFlight:
         self._sense = _TURNING_SENSES.get(config.turning_sense, 1.0)
         self._deadlock_turn = DeadlockTurn(certified.deadlock, self._sense)
         self.commitment = Commitment(
-            certified, program, self._deadlock_turn, fleet.fingerprint, planar=config.planar
+            certified,
+            program,
+            self._deadlock_turn,
+            fleet.fingerprint,
+            planar=config.planar,
+            sides=plan_sides(config),
         )
+        self._vicinity = None if certified.range is None else Vicinity(config)
+        self._listens_since: int | None = None
+        self._last_step = 0
         self._sources = ConstraintSources(config, steps)
         self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
@@ -68,6 +78,7 @@ class CertifiedFlight:
             steps,
             identity(config, fleet),
             Geometry(distances.keeps, distances.apart),
+            None if self._vicinity is None else self._beyond,
         )
         self.reservation = Reservation(
             certified, self.commitment, self.agreements, beside(certified, config.field, config.limits)
@@ -87,6 +98,7 @@ class CertifiedFlight:
         self._in_control = self._announced = self._received = self._participated = False
         self._turn = 0
         self._polled_at: int | None = None
+        self._place: tuple[int, Array | None] | None = None
         self._next_announcement = 0
         self.lookahead_s = float(self._seconds[-1]) + 1e-6 * certified.epoch_us
         """Time (s) from now to the end of the plan that is made next, at most."""
@@ -216,7 +228,7 @@ class CertifiedFlight:
         if not turned:
             return False
         wrong = not self.clocks.wrong.isdisjoint(self.agreements.members)
-        if wrong or self.agreements.missing():
+        if wrong or self.agreements.missing() or self._listens(now):
             if self.commitment.last_call(now):
                 self.commitment.carry_on(HoldReason.CLOCK if wrong else HoldReason.MISSING)
             return False
@@ -225,9 +237,33 @@ class CertifiedFlight:
             return False
         return self.commitment.last_call(now) or not self.agreements.outdated(now, epoch)
 
+    def _beyond(self, now: int, plan: StoredPlan) -> bool:
+        """Return whether ``plan`` shows that its vehicle is beyond the range at ``now`` (µs)."""
+        if self._vicinity is None:
+            return False
+        if self._place is None or self._place[0] != now:
+            horizon = self.commitment.horizon()
+            self._place = now, None if horizon is None else horizon.at(now).position
+        place = self._place[1]
+        return place is not None and self._vicinity.beyond(now, place, plan)
+
+    def _listen(self, now: int) -> None:
+        """Note since when (µs) the companion has listened without a gap."""
+        gap = self._config.certified.contact_us + self._config.certified.epoch_us
+        if self._listens_since is None or now - self._last_step > gap:
+            self._listens_since = now
+        self._last_step = now
+
+    def _listens(self, now: int) -> bool:
+        """Return whether the companion may have heard too little yet of who is within the range."""
+        if self._vicinity is None or self._listens_since is None:
+            return False
+        return now - self._listens_since < 2 * self._config.certified.contact_us
+
     def _take_part(self, now: int) -> bool:
         """Fly the plan of this epoch and agree; return whether that of the next one is to be made."""
         self._polled_at, self._in_control = now, True
+        self._listen(now)
         self.agreements.rejoin()
         turned = self.commitment.turn(now)
         if not (turned and self.commitment.unannounced):

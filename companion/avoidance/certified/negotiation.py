@@ -170,7 +170,9 @@ class Negotiation:
         return before is not None and self._kept(plans.other, AgreedPlans(before.other, before.own), epoch)
 
     def _unambiguous(self, peer: Peer, plans: AgreedPlans, epoch: int) -> bool:
-        """Return whether two plans may be the first ones agreed on, if the peer has contradicted itself.
+        """Return whether two plans may be the first ones agreed on.
+
+        They always may, unless the peer has contradicted itself, or was met within the range.
 
         Then nothing is known of the peer's plan but the plan itself: it must be the least distance from the
         own one from ``epoch`` (µs) on.

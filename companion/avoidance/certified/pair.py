@@ -44,10 +44,13 @@ class Pair:
     """Agreements of the vehicle ``own`` with the vehicle ``peer`` (system ids).
 
     ``leads``: whether this vehicle has the lower id. ``kept``: the own list, from the oldest to the newest.
-    ``considered``: the newest agreement that was taken or refused.
+    ``considered``: the newest agreement that was taken or refused. ``parts``: either may discard all
+    agreements without the other, because it is beyond the range.
     """
 
-    def __init__(self, own: int, peer: int) -> None:
+    def __init__(self, own: int, peer: int, *, parts: bool = False) -> None:
+        self._parts = parts
+        self._last_list: tuple[Agreement, frozenset[Agreement]] = NONE, frozenset()
         self.leads = own < peer
         self.peer = peer
         self.kept: tuple[Agreement, ...] = ()
@@ -123,10 +126,13 @@ class Pair:
         before = self.kept
         if since > self._others_since:
             self._others_since = since
+            self._last_list = NONE, frozenset()
             self._stated = {one for one in self._stated if one.other >= since}
             self.kept = tuple(one for one in self.kept if one.other >= since)
         stated = {Agreement(own, other) for other, own in entry.agreements if other >= since}
         considered = Agreement(entry.considered[1], entry.considered[0])
+        if self._parts:
+            stated = self._still_held(considered, stated)
         self._stated |= stated
         # A statement of before the peer's plan of an agreement cannot have considered that agreement.
         self.kept = tuple(
@@ -140,6 +146,23 @@ class Pair:
         self._succeed()
         return self.kept != before
 
+    def _still_held(self, considered: Agreement, stated: set[Agreement]) -> set[Agreement]:
+        """Return those of a ``stated`` list that no statement shows to be dropped, and note the list.
+
+        What a peer has considered and does not hold, it never holds again; a late statement does not change
+        that. Without parting this follows from the order of agreements alone.
+        """
+        newest, held = self._last_list
+        if self.newer(considered, newest):
+            self._last_list = considered, frozenset(stated)
+        elif considered == newest:
+            self._last_list = newest, held & stated
+        newest, held = self._last_list
+        found = {one for one in stated if one in held or self.newer(one, newest)}
+        gone = {one for one in self._stated if one not in held and not self.newer(one, newest)}
+        self._stated -= gone - set(self.kept)
+        return found
+
     def void(self, others_since: int = 0) -> None:
         """Discard all agreements: the own plan has begun anew, or the peer has said farewell.
 
@@ -147,6 +170,8 @@ class Pair:
         """
         self.kept = ()
         self._stated.clear()
+        if others_since > self._others_since:
+            self._last_list = NONE, frozenset()
         self._others_since = max(self._others_since, others_since)
 
     def entry(self, *, departed: bool) -> Entry:

@@ -18,20 +18,21 @@ _ROUND_TRIP_US = 200_000
 
 
 class Peer:
-    """State of the peer ``system`` as the vehicle ``own`` knows it.
+    """State of the peer ``system`` as the vehicle ``own`` knows it; ``parts``: see ``Pair``.
 
     ``names``: the vehicles of its entries, and whether it has accepted their farewells. ``left``: the last
     plan of a peer whose farewell is accepted. ``departed``: so it is, or was until an own farewell that still
     lasts, with no later plan or statement of it. ``away``: another controller flies it. ``outside``: by how
     much (m) its distance from its plan exceeds the tube. ``contradicted``: it has sent two plans of one
-    epoch, and no agreement was confirmed since. ``last_received``: time (µs) of its last plan or statement.
+    epoch, or was met, and no agreement was confirmed since. ``last_received``: time (µs) of its last plan or
+    statement.
     ``round_trip`` (µs): from a proposal to its answer. ``changed``: the entry about it has changed since it
     was last stated.
     """
 
-    def __init__(self, own: int, system: int) -> None:
+    def __init__(self, own: int, system: int, *, parts: bool = False) -> None:
         self._own = own
-        self.plans, self.pair = PlanFile(), Pair(own, system)
+        self.plans, self.pair = PlanFile(), Pair(own, system, parts=parts)
         self.names: dict[int, bool] = {}
         self.left: StoredPlan | None = None
         self.departed = self.away = self.contradicted = False
@@ -173,6 +174,18 @@ class Peer:
         self.pair.void(others_since)
         self._proposed.clear()
         self.changed = True
+
+    def part(self) -> None:
+        """Discard all agreements with the peer, which is beyond the range."""
+        self.void()
+        self._seen.clear()
+
+    def meet(self) -> None:
+        """Count the peer, which is within the range: a first agreement needs plans that are far enough apart.
+
+        Nothing else is known of its plans than these.
+        """
+        self.contradicted = self.changed = True
 
     def propose(self, now: int, one: Agreement) -> None:
         """Take the agreement ``one``, which the peer has not stated."""

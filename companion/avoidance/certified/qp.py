@@ -147,9 +147,12 @@ class SeparationQp:
         v_max = np.array(limits.v_max)
         self._ranges: Array = np.array([[limits.box_min, limits.box_max], [-v_max, v_max]], dtype=np.float64)
 
-    def solve(self, state: State, objective: Objective, planes: Planes) -> Answer:
+    def solve(
+        self, state: State, objective: Objective, planes: Planes, region: Array | None = None
+    ) -> Answer:
         """Return the best plan from ``state`` that keeps all rows.
 
+        ``region`` (2, 3), m, from corner to corner: the part of the box of the limits to stay in.
         Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs or although
         the QP holds them.
         """
@@ -162,7 +165,11 @@ class SeparationQp:
         of, normals, low = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
         whose = np.empty(planes.wanted.size, np.int64)
         # The planes are made so that the committed plan keeps them.
-        known = *state[:3], self.dt, state.committed, self._ranges
+        ranges = self._ranges
+        if region is not None:
+            ranges = ranges.copy()
+            ranges[0] = np.maximum(ranges[0, 0], region[0]), np.minimum(ranges[0, 1], region[1])
+        known = *state[:3], self.dt, state.committed, ranges
         known += planes.normals, planes.wanted, self._a_max, self._change, a_min, a_max, of, normals, low
         known += (whose,)
         of_planes, count = rows_within(*known)

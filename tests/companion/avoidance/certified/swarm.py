@@ -19,6 +19,7 @@ from companion.avoidance.certified.separating_planes import hull_distance, neare
 from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
 from companion.config.certified import CertifiedConfig
+from companion.config.planning import LimitsConfig
 from companion.values.components import COMPONENT
 from companion.values.horizon import Array, Motion
 from companion.world import View, World
@@ -56,6 +57,8 @@ class Rough(NamedTuple):
     mute: tuple[tuple[int, int, int], ...] = ()
     alone: tuple[tuple[int, int, int], ...] = ()
     again: int = 0
+    reach: float = np.inf
+    """Largest distance (m) of the places on plans at which a message that is sent arrives."""
 
 
 class Habits(NamedTuple):
@@ -278,12 +281,21 @@ class Swarm:
         strangers: bool = False,
         others: Mapping[int, Mapping[str, object]] | None = None,
         planar: bool = False,
+        settings: Mapping[str, object] | None = None,
+        v_max: tuple[float, float, float] | None = None,
     ) -> None:
-        """``others``: other certified settings of some vehicles, by system id."""
+        """``others``: other certified settings of some vehicles, by system id; ``settings``: of all."""
         fleet = tuple(range(1, len(starts) + 1))
-        certified = CertifiedConfig(epoch_us=epoch, fleet=() if strangers else fleet)
+        expected: dict[str, object] = {"epoch_us": epoch, "fleet": () if strangers else fleet}
+        certified = CertifiedConfig.model_validate({**expected, **(settings or {})})
+        limits = LimitsConfig() if v_max is None else LimitsConfig(v_max=v_max)
         self.config = CompanionConfig(
-            task="goto", avoidance="certified", turning_sense="right", certified=certified, planar=planar
+            task="goto",
+            avoidance="certified",
+            turning_sense="right",
+            certified=certified,
+            planar=planar,
+            limits=limits,
         )
         self.d = between(self.config.certified, self.config.field, self.config.limits)
         self._further = further(self.config.certified)
@@ -354,12 +366,19 @@ class Swarm:
                 continue
             ends = {sender.system, receiver.system}
             cut = any(begin <= since < end and len(ends & whom) == 1 for begin, end, whom in rough.cuts)
+            cut |= rough.reach < np.inf and not self._within(since, sender, receiver)
             for _ in range(1 + bool(rng.random() < rough.twice)):
                 arrives = since + 1 + int(rng.random() * rough.delay)
                 if rng.random() >= rough.loss and not (cut or mute):
                     heappush(receiver.inbox, (arrives, next(self._serial), message))
                     if rough.again:
                         heappush(receiver.inbox, (arrives + rough.again, next(self._serial), message))
+
+    def _within(self, since: int, one: Vehicle, two: Vehicle) -> bool:
+        """Whether two vehicles are within reach at ``since`` (µs of the run), where their plans are."""
+        now, step = EPOCH + since, self.config.certified.epoch_us
+        places = [horizon_of(v.plan(now - now % step)).at(now).position for v in (one, two)]
+        return bool(np.linalg.norm(places[0] - places[1]) <= self._rough.reach)
 
     def epochs(self) -> range:
         """All that anybody flew in."""

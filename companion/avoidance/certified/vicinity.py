@@ -1,0 +1,99 @@
+"""Vicinity of a vehicle with ``certified.range``: whom it counts, and how far its plans may reach.
+
+A vehicle counts another from a message of it on that does not show that it is beyond the range, until one
+that does. Only those that it counts need agreements. All points of a plan lie within a box with the sides of
+``plan_sides``, so that two vehicles of which one does not count the other cannot meet before they have heard
+each other; the condition and its proof are in docs/certified.md.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from companion.avoidance.certified.margins import between, fastest, margin
+from companion.avoidance.certified.peer_plans import StoredPlan
+from companion.config import CompanionConfig
+from companion.errors import CompanionError
+from companion.values.horizon import Array
+
+_FLAT = 0.1
+"""Height of the box of a plan at a fixed height, in widths."""
+_ROUNDING_M = 0.01
+"""What speeds and sides of rounded plans may exceed their limits by, as a length (m), at most."""
+
+
+def plan_sides(config: CompanionConfig) -> Array | None:
+    """Return the sides (3,), m, of the box that holds a whole plan; None without ``certified.range``.
+
+    Raises CompanionError if the range leaves no room for plans.
+    """
+    certified, reach = config.certified, config.certified.range
+    if reach is None:
+        return None
+    field, limits = config.field, config.limits
+    margins = 2.0 * margin(certified, field, limits)
+    near = max(1.0, field.downwash) * between(certified, field, limits)
+    closing = 2.0 * fastest(limits) * 2e-6 * (certified.contact_us + certified.epoch_us)
+    least = margins + near + closing + 2.0 * _ROUNDING_M
+    if reach <= least:
+        raise CompanionError(
+            f"certified.range = {reach:g} m leaves no room for plans; more than {least:.3f} m is allowed"
+            " with this d_min, margin, v_max, contact_us and epoch_us"
+        )
+    shape = np.array([1.0, 1.0, _FLAT if config.planar else 1.0])
+    sides: Array = 0.5 * (reach - least) / sqrt(float(shape @ shape)) * shape
+    return sides
+
+
+class Vicinity:
+    """Test of who is certainly beyond the range of ``config``, which must have one."""
+
+    def __init__(self, config: CompanionConfig) -> None:
+        certified = config.certified
+        if certified.range is None:
+            raise CompanionError("certified.range is null")
+        self._beyond = certified.range + 2.0 * margin(certified, config.field, config.limits)
+        self._speed, self._knots = fastest(config.limits), certified.knots
+
+    def beyond(self, now: int, place: Array, plan: StoredPlan) -> bool:
+        """Return whether a vehicle with ``plan`` is certainly beyond the range at ``now`` (µs).
+
+        ``place`` (3,), m: where the own plan is then. The vehicle was, or will be, where its plan is at the
+        beginning and at the end of the plan's epoch, and flies no faster than plans may.
+        """
+        begins, length = plan.plan.epoch, self._knots * plan.plan.dt
+        for time, there in (
+            (begins, plan.controls[0, 0]),
+            (begins + length, plan.rested[self._knots - 1, 2]),
+        ):
+            apart = place - there
+            if sqrt(float(apart @ apart)) - 1e-6 * abs(now - time) * self._speed > self._beyond:
+                return True
+        return False
+
+
+def region(own: Array, towards: Array, sides: Array) -> Array:
+    """Return the box (2, 3), m, from corner to corner, that holds the next plan.
+
+    It holds the committed plan ``own`` (n, 3, 3), m, and has the ``sides`` (3,), m, or those of the committed
+    plan where these are longer. What is left of them is on the side ``towards`` (3,), m, where the plan
+    should end.
+    """
+    points = own.reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = np.maximum(sides - (high - low), 0.0)
+    above = np.clip(towards - high, 0.0, room)
+    below = np.clip(low - towards, 0.0, room)
+    rest = 0.5 * (room - above - below)
+    return np.stack([low - below - rest, high + above + rest])
+
+
+def within_region(own: Array, points: Array, sides: Array) -> bool:
+    """Return whether a plan ``points`` (n, 3, 3), m, is as compact as it must be.
+
+    On each axis it is no longer than ``sides`` (3,), m, or than the committed plan ``own`` (n, 3, 3), m.
+    """
+    lengths = [np.ptp(plan.reshape(-1, 3), axis=0) for plan in (own, points)]
+    return bool((lengths[1] <= np.maximum(sides, lengths[0])).all())
