@@ -12,6 +12,21 @@ from mavlink_bridge.wire.agreements import Statement
 from mavlink_bridge.wire.plan import Integers, WirePlan
 
 
+class Reach(NamedTuple):
+    """Limited range of a fleet.
+
+    ``range`` (m) within which two vehicles hear each other in ``contact`` (µs); ``margins`` (m): by how much
+    the distance of two vehicles may differ from that of their plans; ``sides`` (m): of the box that holds a
+    plan; ``speed`` (m/s): at most that of plans.
+    """
+
+    range: float
+    contact: int
+    margins: float
+    sides: tuple[float, float, float]
+    speed: float
+
+
 class Terms(NamedTuple):
     """Terms that the vehicles agreed on before the flight.
 
@@ -21,7 +36,7 @@ class Terms(NamedTuple):
     ``required``: least distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²);
     ``upright``: whether only horizontal distances count; ``further``: what each column adds to the least
     distance (m); ``downwash``: number by which differences in height are divided; ``surface``: least distance
-    (m) of a plan from the surface of a fixed obstacle.
+    (m) of a plan from the surface of a fixed obstacle; ``reach``: the limited range, if there is one.
     """
 
     fleet: tuple[int, ...]
@@ -36,6 +51,7 @@ class Terms(NamedTuple):
     further: float = 0.0
     downwash: float = 1.0
     surface: float = 0.0
+    reach: Reach | None = None
 
 
 class LoggedPlan(NamedTuple):

@@ -10,6 +10,7 @@ from companion.avoidance.certified.fingerprint import identity
 from companion.avoidance.certified.margins import between, from_surfaces, further
 from companion.config.obstacles import Obstacle
 from outrider.certify.evidence import Terms
+from outrider.certify.ranges import reach_of
 from outrider.errors import Fault, InputError
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION
@@ -116,4 +117,5 @@ def _terms(config: FlyConfig) -> Terms:
         further(certified),
         companion.field.downwash,
         from_surfaces(certified, companion.field, companion.limits),
+        reach_of(companion),
     )

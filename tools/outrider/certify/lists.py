@@ -24,6 +24,7 @@ from mavlink_bridge.wire.agreements import Entry, Epochs, Statement
 from mavlink_bridge.wire.plan import WirePlan
 from outrider.certify.evidence import Finding, Log, LoggedPlan, LoggedStatement, Order, Terms
 from outrider.certify.histories import History, Kind
+from outrider.certify.ranges import Ranges
 from outrider.certify.reservations import Reservations
 
 _NONE: Epochs = (0, 0)
@@ -90,7 +91,7 @@ class _Peer:
                 self._stated |= stated
                 self._lacking.append((epoch, entry.considered[::-1], stated))
 
-    def state(self, statement: Statement, entry: Entry) -> Iterable[tuple[str, str]]:
+    def state(self, statement: Statement, entry: Entry, ranges: Ranges | None) -> Iterable[tuple[str, str]]:
         """Take note of an own entry; yield kind and figures of what the rules forbid."""
         if statement.since > self._own_since:
             self._own_since, self._considered = statement.since, _NONE
@@ -108,7 +109,9 @@ class _Peer:
                 )
             self.listings[one] = self.listings[one]._replace(last=statement.epoch)
         for one in self.listed:
-            if one not in now and not self._leaves(one, entry):
+            last = self.listings[one].last
+            parts = ranges is not None and ranges.may_part(self.system, last, statement.epoch)
+            if one not in now and not parts and not self._leaves(one, entry):
                 yield "an agreement dropped", self._named(one)
         self.listed = entry.agreements
         self._considered = max(self._considered, entry.considered, *entry.agreements, key=self._rank)
@@ -178,6 +181,8 @@ def listings(
     findings: list[Finding] = []
     farewell: int | None = None
     reservations = Reservations(history, terms)
+    reach = terms.reach
+    ranges = None if reach is None else Ranges(history, others, terms, reach)
     columns = log.orders or any(step.plan.column for step in history.steps)
     records: list[LoggedPlan | LoggedStatement | Order] = sorted(
         chain(log.sightings, log.statements, log.orders), key=lambda record: record.number
@@ -214,7 +219,7 @@ def listings(
             for entry in statement.entries:
                 peer = peers.setdefault(entry.peer, _Peer(owner, entry.peer))
                 who = owner, peer.system
-                wrong = peer.state(statement, entry)
+                wrong = peer.state(statement, entry, ranges)
                 findings += [Finding(what, who, record.time, figures) for what, figures in wrong]
                 present = named.get(statement.epoch)
                 if present is None or peer.system in present:
@@ -223,6 +228,10 @@ def listings(
                 if entry.departed or statement.farewell or peer.agreed:
                     continue
                 epoch, figures = statement.epoch, ""
+                if ranges is not None:
+                    allowed, figures = ranges.may_be_unheard(peer.system, epoch)
+                    if allowed:
+                        continue
                 if epoch in released:
                     figures = reservations.released(epoch, peer.system)
                 if figures or epoch not in released:
@@ -231,6 +240,11 @@ def listings(
             reservations.see(record.time, peers)
     for epoch, present in named.items():
         unnamed = sorted(set(terms.fleet) - present - {owner})
-        if unnamed:
+        if ranges is not None:
+            for system in unnamed:
+                allowed, figures = ranges.may_be_unheard(system, epoch)
+                if not allowed:
+                    findings.append(Finding("a plan without an agreement", (owner, system), epoch, figures))
+        elif unnamed:
             findings.append(Finding("a plan without a statement", (owner, *unnamed), epoch, ""))
     return [one for peer in peers.values() for one in peer.listings.values()], findings

@@ -35,6 +35,7 @@ from outrider.certify.evidence import (
     UnreadablePayloads,
 )
 from outrider.certify.fly_runs import fly_runs, is_of_backup, logs_of, obstacles_of, terms_of_runs
+from outrider.certify.ranges import reach_of
 from outrider.errors import Fault, InputError
 from outrider.runs import names
 from outrider.runs.configuration import CONFIGURATION, resolved
@@ -127,6 +128,7 @@ def terms_of(scenario: Scenario) -> Terms:
         further(certified),
         config.field.downwash,
         from_surfaces(certified, config.field, limits),
+        reach_of(config),
     )
 
 

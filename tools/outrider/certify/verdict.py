@@ -10,6 +10,7 @@ from outrider.certify.heights import heights
 from outrider.certify.histories import History, Kind, history
 from outrider.certify.lists import Listing, listings
 from outrider.certify.pairs import Pairs, check
+from outrider.certify.ranges import too_long
 
 
 class Verdict(NamedTuple):
@@ -110,6 +111,8 @@ def judge(evidence: Evidence) -> Verdict:
     began = min(pairs.epochs, default=0)
     listed, wrong = _listed(histories, terms, logs)
     kept = agreed_planes.check(histories, listed, terms)
+    if terms.reach is not None:
+        findings += [one for found in histories for one in too_long(found, terms.reach)]
     fixed = fixed_obstacles.check(histories, obstacles, terms, logs, spans)
     findings += [*pairs.findings, *wrong, *kept.findings, *fixed.findings, *_absent(histories, logs, began)]
     findings.sort(key=lambda finding: (finding.time, finding.who, finding.what, finding.figures))
