@@ -53,7 +53,7 @@ def cells_of(
             measure=comparison.measure,
             goal_radius=comparison.goal_radius,
             vehicles=count,
-            missions=comparison.missions,
+            missions=row.missions or comparison.missions,
             world=row.world or comparison.world,
             worlds=tuple(tuple(box.model_dump(mode="json") for box in one) for one in boxes),
             given=tuple((_places(one.starts), _places(one.goals)) for one in given),

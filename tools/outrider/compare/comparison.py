@@ -46,6 +46,7 @@ class Missions(Part):
     high: Position = Field(description="m, ENU: highest corner")
     offset: Position = Field((0.0, 0.0, 0.0), description="m, added to the places of mission files")
     apart: Length = Field(description="m, of any two starts and of any two goals, in the scene's measure")
+    near: Length | None = Field(None, description="m, largest distance of a goal from its start; null: any")
 
     @model_validator(mode="after")
     def _box(self) -> Self:
@@ -69,6 +70,9 @@ class Row(Part):
     label: Text = Field(description="names the row, and the published figures that belong to it")
     set: dict[Key, JsonValue] = Field({}, description="values of the scenario by dotted key")
     world: World | None = Field(None, description="obstacles of this row, in place of the comparison's")
+    missions: Missions | None = Field(
+        None, description="starts and goals of this row, in place of the comparison's"
+    )
     bar: Bar | None = None
 
 

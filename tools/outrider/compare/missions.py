@@ -53,18 +53,30 @@ def drawn(missions: Missions, measure: Measure, count: int, seed: int) -> Missio
     Raises InputError if there is no room.
     """
     starts = _scatter(missions, measure, count, seed, Stream.SCENE_STARTS, "starts")
-    goals = _scatter(missions, measure, count, seed, Stream.SCENE_GOALS, "goals")
+    goals = _scatter(missions, measure, count, seed, Stream.SCENE_GOALS, "goals", starts)
     return Mission(starts, goals)
 
 
-def _scatter(missions: Missions, measure: Measure, count: int, seed: int, of: Stream, what: str) -> Array:
+def _scatter(
+    missions: Missions,
+    measure: Measure,
+    count: int,
+    seed: int,
+    of: Stream,
+    what: str,
+    about: Array | None = None,
+) -> Array:
+    """Return ``count`` places (count, 3), m; each is ``missions.near`` one of ``about`` (count, 3), m."""
     for attempt in range(_ATTEMPTS):
         random = stream(seed, of, attempt)
         placed = np.empty((0, 3))
         for _ in range(_ROUNDS):
             found = np.round(random.uniform(missions.low, missions.high, size=(_BATCH, 3)), 3) + 0.0
             off = scaled(found[:, None] - placed[None], measure)
-            free = np.flatnonzero((off >= missions.apart).all(axis=1))
+            fits = (off >= missions.apart).all(axis=1)
+            if about is not None and missions.near is not None:
+                fits &= np.linalg.norm(found - about[len(placed)], axis=1) <= missions.near
+            free = np.flatnonzero(fits)
             if free.size:
                 placed = np.vstack([placed, found[free[0]]])
                 if len(placed) == count:

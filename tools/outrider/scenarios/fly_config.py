@@ -143,6 +143,11 @@ class FlyConfig(Settings):
                 f"radio {self.radio}: committed plans do not fit it; "
                 "allowed with companion.avoidance 'certified': null"
             )
+        if self.companion.certified.range is not None:
+            raise ValueError(
+                f"companion.certified.range is {self.companion.certified.range:g}: vehicles that take off "
+                "and land need agreements with all others; allowed: null"
+            )
         if not self.companion.certified.fleet:
             raise ValueError(
                 "companion.certified.fleet is empty: a vehicle that is not heard would not be waited for; "

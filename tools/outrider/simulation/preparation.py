@@ -6,11 +6,14 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import NamedTuple
 
+from companion.avoidance.certified.vicinity import plan_sides
+from companion.errors import CompanionError
 from mavlink_bridge.frames import FleetFrame
 from outrider.errors import Fault, InputError
 from outrider.resources import config_root, find
 from outrider.runs.outcome import Outcome
 from outrider.runs.summary import WALL_FIELDS, Cost, Value, summarise
+from outrider.scenarios.companion_settings import settings_of
 from outrider.scenarios.faults import MotorFailure
 from outrider.scenarios.feasibility import obstacles_to
 from outrider.scenarios.options import Options, apply
@@ -61,10 +64,27 @@ def prepared(scenario: Scenario, where: str) -> Prepared:
     ]
     if vehicle.motion == "point":
         wrong += [Fault(where, reason) for reason in _not_for_points(scenario)]
+    wrong += [Fault(where, reason) for reason in _against_range(scenario)]
     wrong += [Fault(where, reason) for reason in obstacles_to(scenario, vehicle.span)]
     if wrong:
         raise InputError(*wrong)
     return Prepared(scenario, vehicle)
+
+
+def _against_range(scenario: Scenario) -> Iterator[str]:
+    """Yield what a scenario has that committed plans with a limited range do not allow."""
+    certified = scenario.companion.certified
+    if certified.range is None or scenario.companion.avoidance != "certified":
+        return
+    if not scenario.airborne:
+        yield (
+            f"companion.certified.range is {certified.range:g}, but airborne is false: columns are not "
+            "agreed with who is not heard; allowed: null, or airborne: true"
+        )
+    try:
+        plan_sides(settings_of(scenario))
+    except CompanionError as error:
+        yield f"companion.{error}"
 
 
 def _not_for_points(scenario: Scenario) -> Iterator[str]:

@@ -55,6 +55,9 @@ COMMON: dict[str, dict[str, Any]] = {
     "one more": {"certified": {"fleet": [1, 2, 3, 4]}},
     "one less": {"certified": {"fleet": [1, 2]}},
     "nobody named": {"certified": {"fleet": []}},
+    "range": {"certified": {"range": 80.0}},
+    "another range": {"certified": {"range": 81.0}},
+    "contact": {"certified": {"range": 80.0, "contact_us": 400_000}},
 }
 OF_ONE: dict[str, dict[str, Any]] = {
     "acceleration": {"limits": {"u_max": [1.0, 1.0, 1.0], "a_total": 6.0}},
