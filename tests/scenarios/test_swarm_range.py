@@ -11,7 +11,9 @@ from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.header import sending_system
 from outrider.errors import InputError
 from outrider.realtime.flight import RealTimeFlight
+from outrider.scenarios.scenario import Scenario
 from outrider.simulation.flight import Flight
+from outrider.simulation.preparation import prepared
 from tests.scenarios.lockstep_flights import FIREFLY, Flown, fly, scenario
 from tests.scenarios.test_same_seed import facts, logs
 
@@ -69,3 +71,20 @@ def test_only_one_process_has_all_places(tmp_path: Path) -> None:
         Flight(OF, FIREFLY, 5, tmp_path, processes=2)
     with pytest.raises(InputError, match="allowed in real time: null"):
         RealTimeFlight(OF, FIREFLY, 5, tmp_path, tmp_path)
+
+
+def certified(**settings: object) -> Scenario:
+    limits = {"v_max": [1.5, 1.5, 0.5]}
+    companion = {"avoidance": "certified", "certified": settings, "limits": limits}
+    return scenario("antipodal-8", {"airborne": True, "companion": companion})
+
+
+def test_certified_flights_that_no_range_allows_are_refused() -> None:
+    assert prepared(certified(range=15.0), "a file").scenario.companion.certified.range == 15.0
+    with pytest.raises(
+        InputError, match=r"a file: companion\.certified\.range = 3 m leaves no room for plans"
+    ):
+        prepared(certified(range=3.0), "a file")
+    grounded = certified(range=15.0).model_copy(update={"airborne": False})
+    with pytest.raises(InputError, match=r"airborne is false: columns are not agreed"):
+        prepared(grounded, "a file")

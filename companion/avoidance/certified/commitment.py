@@ -188,7 +188,9 @@ class Commitment:
         state = State(
             start.position_m, start.velocity_m_s, self._last_acceleration(), start.accelerations_m_s2
         )
-        box = None if self._sides is None else region(own, goal.place, self._sides - 2.0 * float(np.max(self._rounding)))
+        box = None
+        if self._sides is not None:
+            box = region(own, goal.place, self._sides - 2.0 * self._rounding.max())
         # Rounding may violate a plane that is only just kept: the second attempt adds the rounding error.
         reason = HoldReason.UNSOLVED
         for attempt in range(2):

@@ -19,9 +19,10 @@ from companion.avoidance.certified.fingerprint import identity
 from companion.avoidance.certified.margins import beside, from_surfaces, further
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.peer_plans import StoredPlan
+from companion.avoidance.certified.plan_sides import plan_sides
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.reservation import Reservation
-from companion.avoidance.certified.vicinity import Vicinity, plan_sides
+from companion.avoidance.certified.vicinity import Vicinity
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion

@@ -19,7 +19,7 @@ import numpy as np
 
 from companion.avoidance.certified.committed import carried_on, controls
 from companion.avoidance.certified.margins import fastest, margin
-from companion.avoidance.certified.vicinity import plan_sides
+from companion.avoidance.certified.plan_sides import plan_sides
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
 from mavlink_bridge.wire.plan import WirePlan

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import NamedTuple
 
-from companion.avoidance.certified.vicinity import plan_sides
+from companion.avoidance.certified.plan_sides import plan_sides
 from companion.errors import CompanionError
 from mavlink_bridge.frames import FleetFrame
 from outrider.errors import Fault, InputError

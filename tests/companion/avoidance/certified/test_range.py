@@ -16,7 +16,8 @@ from companion.avoidance.certified.margins import between, fastest, margin
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.pair import Agreement, Pair
 from companion.avoidance.certified.peer_plans import StoredPlan, stored
-from companion.avoidance.certified.vicinity import Vicinity, plan_sides, region, within_region
+from companion.avoidance.certified.plan_sides import plan_sides
+from companion.avoidance.certified.vicinity import Vicinity, region, within_region
 from companion.config import CompanionConfig
 from companion.config.certified import CertifiedConfig
 from companion.errors import CompanionError
@@ -123,7 +124,7 @@ def test_a_short_plan_stays_short_when_it_is_carried_on(seed: int) -> None:
 
 
 @given(seeds, st.integers(-3 * LENGTH, 8 * LENGTH))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_who_seems_beyond_is_beyond_however_old_the_plan_is(seed: int, later: int) -> None:
     """The other flies its plan in the plan's epoch, and otherwise anything at the speeds of plans."""
     rng = np.random.default_rng(seed)
@@ -135,8 +136,8 @@ def test_who_seems_beyond_is_beyond_however_old_the_plan_is(seed: int, later: in
         return
     ends = theirs.controls[0, 0], theirs.controls[0, 2]
     since = [1e-6 * abs(later - at) * speed for at in (0, LENGTH)]
-    steps = rng.normal(size=(3000, 3))
-    steps *= (rng.uniform(0.8, 1.0, 3000) / np.linalg.norm(steps, axis=1))[:, None]
+    steps = rng.normal(size=(1000, 3))
+    steps *= (rng.uniform(0.8, 1.0, 1000) / np.linalg.norm(steps, axis=1))[:, None]
     nearest = int(np.argmin(since))
     there = ends[nearest] + since[nearest] * steps
     possible = there[np.linalg.norm(there - ends[1 - nearest], axis=1) <= since[1 - nearest]]
