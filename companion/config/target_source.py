@@ -69,6 +69,20 @@ class OwnErrors(Settings):
     )
     tilt_s: float = Field(20.0, gt=0.0, le=3600.0, description="s")
     sigma_white: float = Field(0.03, ge=0.0, le=10.0, description="m, of each position; not in common")
+    age_us: int = Field(
+        0,
+        ge=0,
+        le=500_000,
+        description="µs: age of the position that a vehicle states, at the time that it states; corrected by"
+        " its velocity",
+    )
+    sigma_time_us: float = Field(
+        5000.0,
+        ge=0.0,
+        le=500_000.0,
+        description="µs, σ of the images' times that all vehicles have in common; the target's speed makes it"
+        " an error of its place",
+    )
 
 
 _GNSS_ERRORS = OwnErrors()

@@ -69,6 +69,7 @@ class Fusion:
     def __init__(self, config: FusedSource, window: int) -> None:
         self._window = window
         self._noise = _noise(config)
+        self._time_sigma = 1e-6 * config.errors.sigma_time_us
         self._accelerations = np.square([config.sigma_acceleration, config.sigma_climb])
         self._variances = self._noise[-2 * PER_VEHICLE :: 2]
         self._slots: dict[int, int] = {}
@@ -136,6 +137,9 @@ class Fusion:
         elapsed = max(time - int(self._times[count - 1]), 0)
         state, covariance = np.empty(6), np.empty((3, 3))
         ahead(1e-6 * elapsed, 1e-6 * min(elapsed, longest), x, P, memory, self._noise, state, covariance)
+        # An error of the images' times moves the place along the velocity.
+        along = self._time_sigma * x[3:6]
+        covariance += np.outer(along, along)
         return Belief(passed, state[:3], state[3:], covariance)
 
     def recent(self, since: int) -> dict[int, Seen]:
@@ -297,7 +301,7 @@ def _noise(config: FusedSource) -> Array:
     position, yaw = 1.0 / errors.position_s, radians(errors.sigma_yaw_deg) ** 2
     tilt = radians(errors.sigma_tilt_deg) ** 2
     target = [config.sigma_acceleration**2, config.sigma_climb**2, 1.0 / config.acceleration_s]
-    adaptation = [1.0 / config.adapt_s, 2.0 * log(config.adapt)]
+    adaptation = [1.0 / config.adapt_s, 2.0 * log(config.adapt), 1e-6 * errors.age_us]
     parts = [horizontal, position, horizontal, position, vertical, position]
     parts += [yaw, 1.0 / errors.yaw_s, tilt, 1.0 / errors.tilt_s]
     return np.array([config.gate, errors.sigma_white**2, *target, *adaptation, *parts])

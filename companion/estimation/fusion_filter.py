@@ -33,22 +33,29 @@ FIELDS = 22
 Place (3), covariance R of the camera alone (9, by rows), directions (3) into which yaw and elevation of the
 ray move the place, the camera's place (3), and the measured distance; m.
 """
-_GATE, _WHITE, _VARIANCES, _DECAY, _FORGET, _BOUND, _ERRORS = 0, 1, 2, 4, 5, 6, 7
+_GATE, _WHITE, _VARIANCES, _DECAY, _FORGET, _BOUND, _AGE, _ERRORS = 0, 1, 2, 4, 5, 6, 7, 8
 """Places in ``noise``."""
 NOISE = _ERRORS + 2 * PER_VEHICLE
 """Numbers of ``noise``.
 
 Gate; variance of a vehicle's position that is not in common (m²); variances of the target's horizontal and
 vertical acceleration (m²/s⁴); rates (1/s) at which the acceleration decays, and θ's information; bound of
-θ; variance and rate of decay (1/s) of each of the five errors of a vehicle.
+θ; age (s) of a vehicle's own position; variance and rate of decay (1/s) of each of the five errors of a
+vehicle.
 """
 GROUPS = 2
 """Number of variances of the acceleration."""
 _INFORMATION, _SENSITIVITY = GROUPS, 2 * GROUPS
 ADAPTED = _SENSITIVITY + GROUPS * TARGET * TARGET
 """Numbers of ``memory`` before those of the vehicles: each θ, its information, and its D (TARGET, TARGET)."""
-MARKS = 2
-"""Numbers of ``memory`` of each vehicle: mean d², and seconds since its errors were last advanced."""
+MARKS = 8
+"""Numbers of ``memory`` of each vehicle.
+
+Mean d² (0 before its first detection), seconds since its last one, and the place (3) and the velocity (3) of
+its camera then, m, m/s.
+"""
+_SMOOTH_S, _LONGEST_S = 0.5, 1.0
+"""Time constant with which a camera's velocity follows differences of its places; longest of these (s)."""
 WHITE_SHARE = 0.02
 """Of the target's acceleration, the part that is white: a share of the spectral density at 0 Hz.
 
@@ -258,7 +265,7 @@ def replay(
     n, vehicles = len(x0), (len(memory0) - ADAPTED) // MARKS
     B, K, S, T = np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 3)), np.empty((3, 3))
     y, u, place, R = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    F, Q, L = np.empty(4), np.empty(6), np.empty((TARGET, TARGET))
+    F, Q, L, moved = np.empty(4), np.empty(6), np.empty((TARGET, TARGET)), np.zeros(3)
     for i in range(first, count):
         if i == 0:
             X[i], PP[i], memories[i] = x0, P0, memory0
@@ -287,9 +294,23 @@ def replay(
                 memory[ADAPTED + MARKS * k + 1] += dt
         slot = slots[i]
         base, mark = TARGET + PER_VEHICLE * slot, ADAPTED + MARKS * slot
-        if slot >= 0 and memory[mark + 1] > 0.0:
-            _advance_errors(x, P, base, memory[mark + 1], noise)
+        moved[:], lead = 0.0, 0.0
+        if slot >= 0:
+            since = memory[mark + 1]
+            if since > 0.0:
+                _advance_errors(x, P, base, since, noise)
             memory[mark + 1] = 0.0
+            follow = 1.0 - exp(-since / _SMOOTH_S) if since > 0.0 and memory[mark] > 0.0 else 0.0
+            lead = noise[_AGE] * follow / max(since, 1e-6)
+            for a in range(3):
+                at, speed = mark + 2 + a, mark + 5 + a
+                if since > _LONGEST_S:
+                    memory[speed] = 0.0
+                elif follow > 0.0:
+                    memory[speed] += follow * ((data[i, 18 + a] - memory[at]) / since - memory[speed])
+                memory[at] = data[i, 18 + a]
+                # The place is that of an older estimate; the vehicle has moved on since.
+                moved[a] = noise[_AGE] * memory[speed]
         for a in range(3):
             for b in range(3):
                 R[a, b], place[a, b] = data[i, 3 + 3 * a + b], P[a, b]
@@ -304,10 +325,11 @@ def replay(
             for a in range(3):
                 for b in range(3):
                     R[a, b] *= scale
-                R[a, a] += noise[_WHITE]
+                # The velocity has a part of this error.
+                R[a, a] += noise[_WHITE] * (1.0 + lead) ** 2
         for a in range(3):
             g, h = distance * data[i, 12 + a], distance * data[i, 15 + a]
-            y[a] = data[i, a] - x[a]
+            y[a] = data[i, a] + moved[a] - x[a]
             if slot >= 0:
                 y[a] -= x[base + a] + g * x[base + 3] + h * x[base + 4]
             for j in range(n):

@@ -11,6 +11,7 @@ import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from math import degrees, radians, tan
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
@@ -25,6 +26,7 @@ from outrider.runs.ground_truth import Samples
 from outrider.runs.perception import bearings_quality
 from outrider.scenarios.changes import merged
 from outrider.scenarios.companion_settings import settings_of
+from outrider.scenarios.part import FIRST_SYSTEM
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.flight import Flight
 from outrider.yaml_files.yaml_file import load
@@ -33,6 +35,28 @@ from sitl.vehicle.config import VehicleConfig
 Array = NDArray[np.float64]
 AHEAD_US, FROM_US = 100_000, 2_000_000
 """An estimate is compared so long after each image, from so long after the start on."""
+_COARSE_PIXELS, _FINE_PIXELS, _RANGE_M = 8.0, 4.6, 0.6
+"""σ (pixels) of cameras of which one has three times the w_k of the others: σ² 2.98 to 1, rays 7.8 m long."""
+_FOCAL_PIXELS = 640.0 / tan(radians(35.0))
+
+
+def _unequal(vehicles: int) -> Mapping[str, Any]:
+    """Return the changes for a fleet whose first camera weighs three times as much as each other one.
+
+    The formation takes the weights as measured; the configured ones are those of its figure.
+    """
+    coarse, fine = (degrees(pixels / _FOCAL_PIXELS) for pixels in (_COARSE_PIXELS, _FINE_PIXELS))
+    better = {"vehicle": FIRST_SYSTEM, "sigma_range": _RANGE_M, "sigma_bearing_deg": fine}
+    camera = {"mount": {"kind": "gimbal", "pitch_deg": 40.0}, "rate_hz": 10.0, "latency_ms": 100.0}
+    formation = {"sigma_range": _RANGE_M, "sigma_bearing_deg": coarse, "cameras": [better]}
+    return {
+        "vehicles": vehicles,
+        "camera": {"pixel_sigma": _COARSE_PIXELS},
+        "cameras": [{"vehicle": FIRST_SYSTEM, "camera": {**camera, "pixel_sigma": _FINE_PIXELS}}],
+        "companion": {"formation": formation},
+    }
+
+
 CASES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "2": {"vehicles": 2},
@@ -41,6 +65,8 @@ CASES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "8": {"vehicles": 8},
         "5, loss 20 %": {"links": {"swarm": {"loss": 0.2}}},
         "disturbed": {"camera": {"false_positives": 0.05, "missed": 0.2, "latency_ms": 200.0}},
+        "3, unequal": _unequal(3),
+        "5, unequal": _unequal(5),
         "certified": {"companion": {"avoidance": "certified"}},
     }
 )
@@ -50,7 +76,8 @@ class Figures(NamedTuple):
     """Figures of one flight.
 
     ``fused``, ``single`` (m): RMSE of all cameras together and of the best one; ``nees`` of three and its
-    degrees of freedom ``freedom``; ``jump`` (m): largest change of the error from one image to the next;
+    degrees of freedom ``freedom``, ``level`` and ``height`` NEES of the horizontal plane (two) and of the
+    height (one); ``jump`` (m): largest change of the error from one image to the next;
     ``bearings``: |s|/Σw over the last two seconds; ``angle`` (deg): between the first two vehicles, at the
     end; ``separation`` (m): least distance of two vehicles at any time.
     """
@@ -59,6 +86,8 @@ class Figures(NamedTuple):
     single: float
     nees: float
     freedom: float
+    level: float
+    height: float
     jump: float
     bearings: float
     angle: float
@@ -129,13 +158,14 @@ def errors(heard: Heard, samples: Samples, vehicle: int | None = None) -> tuple[
 
 
 def nees(off: Array, covariances: Array) -> tuple[float, float]:
-    """Return the mean of the squared normalised errors of three axes, and its degrees of freedom.
+    """Return the mean of the squared normalised errors ``off`` (n, m), and its degrees of freedom.
 
+    ``covariances`` (n, m, m); the mean is m if they are right.
     Successive errors are not independent: n rows with the correlation time τ (rows) are n/τ numbers.
     """
     normalised = np.linalg.solve(np.linalg.cholesky(covariances), off[..., None])[..., 0]
     inverse = sum(_correlation_time(axis) / len(axis) for axis in normalised.T)
-    return float((normalised**2).sum(axis=1).mean()), 9.0 / inverse
+    return float((normalised**2).sum(axis=1).mean()), off.shape[1] ** 2 / inverse
 
 
 def _correlation_time(values: Array) -> float:
@@ -164,6 +194,8 @@ def figures(case: str, sensors: str, seed: int, seconds: float) -> Figures:
         min(_rms(one) for one in alone if len(one)),
         mean,
         freedom,
+        nees(off[:, :2], covariances[:, :2, :2])[0],
+        nees(off[:, 2:], covariances[:, 2:, 2:])[0],
         float(np.linalg.norm(np.diff(off, axis=0), axis=1).max()),
         float(quality[late].mean()),
         float(np.abs(apart).mean()),
@@ -216,7 +248,7 @@ def _say(line: str) -> None:
 def _said(row: Figures) -> str:
     return (
         f"fused {row.fused:.4f} m, single {row.single:.4f} m, ratio {row.fused / row.single:.3f},"
-        f" NEES {row.nees:.2f} (ν {row.freedom:.0f}), jump {row.jump:.3f} m, |s|/Σw {row.bearings:.3f},"
+        f" NEES {row.nees:.2f} (ν {row.freedom:.0f}, plane {row.level:.2f}, height {row.height:.2f}), jump {row.jump:.3f} m, |s|/Σw {row.bearings:.3f},"
         f" angle {row.angle:.1f}°, separation {row.separation:.2f} m"
     )
 

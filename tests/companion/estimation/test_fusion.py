@@ -29,7 +29,12 @@ from tests.companion.estimation.cameras import (
 WINDOW = 2_000_000
 STEP = 100_000
 EXACT = OwnErrors(
-    sigma_horizontal=0.0, sigma_vertical=0.0, sigma_yaw_deg=0.0, sigma_tilt_deg=0.0, sigma_white=0.0
+    sigma_horizontal=0.0,
+    sigma_vertical=0.0,
+    sigma_yaw_deg=0.0,
+    sigma_tilt_deg=0.0,
+    sigma_white=0.0,
+    sigma_time_us=0.0,
 )
 
 
@@ -66,13 +71,15 @@ def test_errors_are_as_large_as_the_covariance_says(profile):
     """NEES of the position over flights with other errors, and NIS, within the 95 % bands of χ².
 
     The acceleration's σ is known and not adapted: with an estimated one the bands hold approximately only.
+    All images are as much earlier or later than they say, by the σ that the filter assumes.
     """
     count, nees, nis = 150, [], []
     for seed in range(count):
         source, found, walker = flight(profile, seed, 4.0)
         fusion = fused(source.model_copy(update={"gate": 1e3, "adapt": 1.0}), found)
         known = at(fusion, found[-1].time)
-        off = known.position - walker.place
+        late = 1e-6 * source.errors.sigma_time_us * np.random.default_rng([seed, 91]).normal()
+        off = known.position - walker.place - late * walker.velocity
         nees.append(float(off @ np.linalg.solve(known.covariance, off)))
         # The first ones say where it is.
         nis.append(fusion.innovations[9:])
@@ -91,6 +98,54 @@ def test_treated_as_white_a_bias_of_gnss_makes_it_far_too_confident():
         off = known.position - walker.place
         nees.append(float(off @ np.linalg.solve(known.covariance, off)))
     assert np.mean(nees) > 30.0
+
+
+def escorted(source: FusedSource, speed: float, age: float, seconds: float = 4.0):
+    """Exact detections of a target that walks east, by vehicles that keep beside it.
+
+    Each states where it was ``age`` s ago. Return them and where the target was in the last image.
+    """
+    found, place = [], np.zeros(3)
+    for tick in range(round(1e6 * seconds / STEP)):
+        place = np.array([1e-6 * STEP * tick * speed, 0.0, 0.0])
+        for k in range(3):
+            camera = place + np.array([6.0 * np.cos(2.1 * k), 6.0 * np.sin(2.1 * k), 5.0])
+            stated = np.array([age * speed, 0.0, 0.0])
+            seen, believed = place - stated, camera - stated
+            one = detection(
+                source, 11 + k, START + tick * STEP, seen, believed, message(11 + k, seen, believed)
+            )
+            assert one is not None
+            found.append(one)
+    return found, place
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.5, 4.0])
+def test_the_age_of_stated_positions_is_no_lag_of_the_target(speed):
+    """All vehicles that move with the target have the same error, so without the correction it remains."""
+    age = 0.05
+    source = source_of("rtk").model_copy(update={"own_errors": EXACT})
+    found, place = escorted(source, speed, age)
+    lagging = at(fused(source, found), found[-1].time)
+    np.testing.assert_allclose(lagging.position, place - [age * speed, 0.0, 0.0], atol=2e-3)
+    errors = EXACT.model_copy(update={"age_us": round(1e6 * age)})
+    known = at(fused(source.model_copy(update={"own_errors": errors}), found), found[-1].time)
+    np.testing.assert_allclose(known.position, place, atol=2e-3)
+
+
+def test_an_error_of_the_times_in_common_is_uncertainty_along_the_way():
+    source = source_of("rtk")
+    found, _ = escorted(source, 3.0, 0.0)
+    sure = source.errors.model_copy(update={"sigma_time_us": 0.0})
+    unsure = source.errors.model_copy(update={"sigma_time_us": 20_000.0})
+    a, b = (
+        at(fused(source.model_copy(update={"own_errors": errors}), found), found[-1].time)
+        for errors in (sure, unsure)
+    )
+    np.testing.assert_array_equal(a.position, b.position)
+    along = 0.02 * a.velocity
+    assert along[0] == pytest.approx(0.06, rel=0.02)
+    np.testing.assert_allclose(b.covariance - a.covariance, np.outer(along, along), atol=1e-9)
 
 
 @given(st.integers(0, 1000))

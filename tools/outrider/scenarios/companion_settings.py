@@ -9,11 +9,8 @@ from companion.config.target_source import FusedSource, OwnErrors
 from outrider.scenarios.scenario import Scenario
 from sitl.estimation.profiles import PROFILES, SensorProfile
 
-_MESSAGE_ERROR_M = 0.01
-"""σ (m) of a detection by what messages leave of place and time.
-
-Place: σ 0.3 cm of a step of 1.1 cm (degE7), twice; time: some ms between the clocks, at walking speed.
-"""
+_MESSAGE_ERROR_M = 0.0045
+"""σ (m) of a detection by what messages leave of its place: 0.32 cm of a step of 1.1 cm (degE7), twice."""
 
 
 def settings_of(scenario: Scenario) -> CompanionConfig:
@@ -55,4 +52,5 @@ def own_errors(profile: SensorProfile, scenario: Scenario | None = None) -> OwnE
         sigma_tilt_deg=0.0 if mounts == {"gimbal"} else degrees(profile.tilt),
         tilt_s=profile.tilt_time,
         sigma_white=hypot(profile.position_white, _MESSAGE_ERROR_M),
+        age_us=profile.delay,
     )
