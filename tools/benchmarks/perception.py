@@ -248,7 +248,8 @@ def _say(line: str) -> None:
 def _said(row: Figures) -> str:
     return (
         f"fused {row.fused:.4f} m, single {row.single:.4f} m, ratio {row.fused / row.single:.3f},"
-        f" NEES {row.nees:.2f} (ν {row.freedom:.0f}, plane {row.level:.2f}, height {row.height:.2f}), jump {row.jump:.3f} m, |s|/Σw {row.bearings:.3f},"
+        f" NEES {row.nees:.2f} (ν {row.freedom:.0f}, plane {row.level:.2f}, height {row.height:.2f}),"
+        f" jump {row.jump:.3f} m, |s|/Σw {row.bearings:.3f},"
         f" angle {row.angle:.1f}°, separation {row.separation:.2f} m"
     )
 
