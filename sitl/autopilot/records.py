@@ -22,11 +22,12 @@ from sitl.autopilot.firmware import Firmware
 from sitl.autopilot.firmware.mode_list import standard_mode
 from sitl.autopilot.flight_times import FlightTimes
 from sitl.autopilot.logs.dataflash import DataFlash
-from sitl.autopilot.logs.moment import Moment
+from sitl.autopilot.logs.moment import LoggedParameter, Moment
 from sitl.autopilot.logs.protocol import LogProtocol
 from sitl.autopilot.logs.recorder import Recorder
 from sitl.autopilot.logs.ulog import Ulog
 from sitl.autopilot.own_clock import OwnClock
+from sitl.autopilot.parameters.parameter import Kind
 from sitl.autopilot.parameters.values import Values
 from sitl.autopilot.plant import Plant
 from sitl.telemetry.reports import Snapshot
@@ -84,7 +85,7 @@ class Records:
         self.flight.watch(now, armed=commander.armed, landed=commander.landed)
         if self._records:
             mode = self._firmware.custom_mode(commander.mode)
-            self._recorder.watch(now, armed=commander.armed, custom_mode=mode)
+            self._recorder.watch(self._clock.stamp(now), armed=commander.armed, custom_mode=mode)
 
     def report(self, telemetry: Telemetry) -> None:
         """Add the messages about files and modes."""
@@ -107,12 +108,17 @@ class Records:
     def _moment(self, now: int) -> Moment:
         estimate = self._plant.estimate()
         place = self._origin.geodetic(estimate.position)
-        return Moment(self._clock.stamp(now), estimate, *place, self._home.altitude)
+        return Moment(now, estimate, *place, self._home.altitude)
 
-    def _parameters(self) -> Iterable[tuple[str, float, float]]:
+    def _parameters(self) -> Iterable[LoggedParameter]:
         values = self._values
         return (
-            (parameter.name, values.value(number), values.initial(number))
+            LoggedParameter(
+                parameter.name,
+                values.value(number),
+                values.initial(number),
+                whole=parameter.kind is not Kind.REAL32,
+            )
             for number, parameter in enumerate(values.table)
         )
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from struct import Struct
 from typing import Final
 
-from sitl.autopilot.logs.moment import Moment
+from sitl.autopilot.logs.moment import LoggedParameter, Moment
 
 # Name, DataFlash format, struct, columns. c is cdeg as int16 in the format's table; f avoids its rounding.
 _TYPES: Final = {
@@ -36,13 +36,13 @@ class DataFlash:
 
     extension = "BIN"
 
-    def head(self, time: int, parameters: Iterable[tuple[str, float, float]]) -> bytes:
-        """Return the beginning of a log at ``time`` (µs); ``parameters``: name, value, default."""
+    def head(self, time: int, parameters: Iterable[LoggedParameter]) -> bytes:
+        """Return the beginning of a log at ``time`` (µs)."""
         types = [
             _record(0x80, number, 3 + _STRUCTS[number].size, name.encode(), form.encode(), columns.encode())
             for number, (name, form, _, columns) in _TYPES.items()
         ]
-        values = [_record(0x81, time, name.encode(), value, usual) for name, value, usual in parameters]
+        values = [_record(0x81, time, one.name.encode(), one.value, one.default) for one in parameters]
         return b"".join([*types, _record(0x87, time, b"ArduCopter V4.6.3 (outrider)"), *values])
 
     def moment(self, m: Moment) -> bytes:

@@ -1,4 +1,4 @@
-"""Moment of a flight, as a log records it."""
+"""What a log records: moments of a flight, and parameters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from sitl.estimation.sensors import Estimate
 
 
 class Moment(NamedTuple):
-    """Estimate at ``time`` (µs since boot), with its place (degrees, m above mean sea level)."""
+    """Estimate at ``time`` (µs since boot, by the vehicle's clock).
+
+    With its place (degrees, m above mean sea level).
+    """
 
     time: int
     estimate: Estimate
@@ -16,3 +19,12 @@ class Moment(NamedTuple):
     longitude: float
     altitude: float
     home_altitude: float
+
+
+class LoggedParameter(NamedTuple):
+    """Value and default of a parameter; ``whole``: it is an integer."""
+
+    name: str
+    value: float
+    default: float
+    whole: bool

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Final
 
 from sitl.autopilot.logs.dataflash import DataFlash
-from sitl.autopilot.logs.moment import Moment
+from sitl.autopilot.logs.moment import LoggedParameter, Moment
 from sitl.autopilot.logs.ulog import Ulog
 
 _PERIOD_US: Final = 100_000
@@ -30,12 +30,12 @@ class Recorder:
         self,
         encoder: type[DataFlash] | type[Ulog],
         moment: Callable[[int], Moment],
-        parameters: Callable[[], Iterable[tuple[str, float, float]]],
+        parameters: Callable[[], Iterable[LoggedParameter]],
         epoch: Callable[[], int],
     ) -> None:
         """Set what is recorded.
 
-        ``moment`` returns the moment of a time (µs), ``parameters`` name, value and default of each,
+        ``moment`` returns the moment of a time (µs), ``parameters`` all parameters,
         ``epoch`` the Unix time of the boot (µs), 0 if unknown.
         """
         self._new, self._moment, self._parameters, self._epoch = encoder, moment, parameters, epoch
@@ -52,7 +52,7 @@ class Recorder:
         return self._new.extension
 
     def watch(self, now: int, *, armed: bool, custom_mode: int) -> None:
-        """Record what is due at ``now`` (µs since boot)."""
+        """Record what is due at ``now`` (µs since boot, by the vehicle's clock)."""
         if armed and self._open is None:
             self._begin(now)
         log = self._open

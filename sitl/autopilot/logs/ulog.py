@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from struct import Struct
 from typing import Final
 
-from sitl.autopilot.logs.moment import Moment
+from sitl.autopilot.logs.moment import LoggedParameter, Moment
 from sitl.values.attitudes import quaternion
 
 _MAGIC: Final = b"ULog\x01\x12\x35\x01"
@@ -15,6 +15,7 @@ _POSITION: Final = Struct("<Q7f")
 _ATTITUDE: Final = Struct("<Q4f")
 _GLOBAL: Final = Struct("<Q2df")
 _STATUS: Final = Struct("<QIB")
+_INTEGER, _FLOAT = Struct("<i"), Struct("<f")
 _FORMATS: Final = (
     "vehicle_local_position:uint64_t timestamp;float x;float y;float z;"
     "float vx;float vy;float vz;float heading;",
@@ -34,6 +35,12 @@ def _keyed(kind: str, key: str, value: bytes) -> bytes:
     return _message(kind, bytes((len(key),)) + key.encode() + value)
 
 
+def _parameter(one: LoggedParameter) -> bytes:
+    if one.whole:
+        return _keyed("P", f"int32_t {one.name}", _INTEGER.pack(int(one.value)))
+    return _keyed("P", f"float {one.name}", _FLOAT.pack(one.value))
+
+
 def _data(topic: int, data: bytes) -> bytes:
     return _message("D", topic.to_bytes(2, "little") + data)
 
@@ -46,12 +53,12 @@ class Ulog:
     def __init__(self) -> None:
         self._mode, self._armed = 0, _ARMED
 
-    def head(self, time: int, parameters: Iterable[tuple[str, float, float]]) -> bytes:
-        """Return the beginning of a log at ``time`` (µs); ``parameters``: name, value, default."""
+    def head(self, time: int, parameters: Iterable[LoggedParameter]) -> bytes:
+        """Return the beginning of a log at ``time`` (µs)."""
         pieces = [_MAGIC, time.to_bytes(8, "little"), _message("B", bytes(40))]
         pieces.append(_keyed("I", "char[3] sys_name", b"PX4"))
         pieces += [_message("F", text.encode()) for text in _FORMATS]
-        pieces += [_keyed("P", f"float {name}", Struct("<f").pack(value)) for name, value, _ in parameters]
+        pieces += map(_parameter, parameters)
         for topic, text in enumerate(_FORMATS):
             name = text.partition(":")[0].encode()
             pieces.append(_message("A", b"\0" + topic.to_bytes(2, "little") + name))

@@ -13,11 +13,14 @@ from pymavlink import DFReader
 from pymavlink.dialects.v20 import all as dialect
 from pyulog import ULog
 
+from sitl.autopilot.parameters.parameter import Kind
+from sitl.autopilot.parameters.px4 import table
 from tests.sitl.autopilot_rig import ARM, FLAVOURS, LAND, Rig
 from tests.sitl.ftp_client import Ftp
 from tests.sitl.outside_client import Client
 
 FIRST = {"ardupilot": 1, "px4": 0}
+DRIFT_PPM = 10_000.0
 
 
 def flown(flavour: str) -> Client:
@@ -79,6 +82,8 @@ def test_the_firmwares_readers_find_the_flight(client, tmp_path: Path):
         height = -log.get_dataset("vehicle_local_position").data["z"]
         assert set(log.get_dataset("vehicle_status").data["arming_state"]) == {1, 2}
         assert log.initial_parameters["COM_OF_LOSS_T"] == pytest.approx(1.0)
+        whole = {one.name for one in table(6) if one.kind is not Kind.REAL32}
+        assert {name for name, value in log.initial_parameters.items() if isinstance(value, int)} == whole
         assert log.get_dataset("vehicle_attitude").data["q[0]"].min() > 0.9
     else:
         file = tmp_path / "1.BIN"
@@ -95,6 +100,27 @@ def test_the_firmwares_readers_find_the_flight(client, tmp_path: Path):
     assert len(height) > 100
     assert max(height) == pytest.approx(4.0, abs=0.3)
     assert abs(height[-1]) < 0.1
+
+
+def test_all_records_of_a_log_have_times_of_the_vehicles_clock(tmp_path: Path):
+    """So their times never go back, however wrong the clock is."""
+    client = Client(
+        Rig("ardupilot", tick=10_000, streams="normal", clock_drift_ppm=DRIFT_PPM, ready_after=8.0)
+    )
+    client.wait(9.0)
+    for command in ((176, 1, 4), (ARM, 1), (176, 1, 17), (ARM, 0)):
+        assert client.command(*command) == 0
+        client.wait(0.35)
+    client.rig.most = 2
+    (entry,) = listed(client)
+    file = tmp_path / "1.BIN"
+    file.write_bytes(download(client, entry))
+    reader, times = DFReader.DFReader_binary(str(file)), []
+    while (message := reader.recv_msg()) is not None:
+        if message.get_type() != "FMT":
+            times.append(message.TimeUS)
+    reader.close()
+    assert times == sorted(times)
 
 
 def test_ardupilot_gives_no_log_while_armed_and_px4_does():
