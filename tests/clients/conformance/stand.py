@@ -33,7 +33,7 @@ class Stand(Client):
         )
         rig.most = 4
         super().__init__(rig)
-        for message_id in (30, 32, 33):
+        for message_id in (30, 32, 33, 74):
             self.command(INTERVAL, message_id, 100_000)
         self.wait(1.5)
 
