@@ -19,6 +19,8 @@ SPEED, RTL, LOITER, INTERVAL, FAIL = 178, 20, 17, 511, 420
 PX4_MODES: Final = {"hold": (1, 4, 3), "mission": (1, 4, 4), "return": (1, 4, 5), "follow": (1, 4, 8)}
 COPTER: Final = {"AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
 NAN: Final = math.nan
+PHYSICS: Final = ("own", "jsbsim")
+"""Every flight is flown with both."""
 
 
 class Stand(Client):

@@ -19,6 +19,7 @@ from tests.clients.conformance.stand import (
     COPTER,
     FAIL,
     LOITER,
+    PHYSICS,
     RTL,
     SET_MODE,
     SPEED,
@@ -36,9 +37,9 @@ pytestmark = pytest.mark.slow
 TAKE_OFF, POSITION_ONLY = 22, 0xDF8
 
 
-@pytest.fixture
-def copter() -> Stand:
-    return Stand("ardupilot", failures="obeyed")
+@pytest.fixture(params=PHYSICS)
+def copter(request: pytest.FixtureRequest) -> Stand:
+    return Stand("ardupilot", failures="obeyed", physics=request.param)
 
 
 def rtl_complete(client: Stand) -> None:

@@ -14,6 +14,7 @@ from tests.clients.conformance.stand import (
     FAIL,
     LAND,
     NAN,
+    PHYSICS,
     PX4_MODES,
     RTL,
     SET_MODE,
@@ -32,9 +33,9 @@ pytestmark = pytest.mark.slow
 TAKE_OFF, REPOSITION_HERE, CREATE = 22, 192, 6
 
 
-@pytest.fixture
-def px4() -> Stand:
-    return Stand("px4")
+@pytest.fixture(params=PHYSICS)
+def px4(request: pytest.FixtureRequest) -> Stand:
+    return Stand("px4", physics=request.param)
 
 
 def offboard_goto(client: Stand, x: float, y: float, z: float, yaw: float, seconds: float) -> None:
