@@ -23,6 +23,7 @@ from mavlink_bridge.messages import (
     Source,
 )
 from mavlink_bridge.pinhole import Pinhole, conjugate, extent, product, rotated, upward
+from mavlink_bridge.wire.codec import Codec
 from sitl.values.attitudes import quaternion
 from tests.companion.estimation.cameras import FLEET, START, message
 
@@ -142,9 +143,25 @@ def test_a_detection_that_arrives_twice_counts_once():
     assert (of.target.counts.used, of.target.counts.invalid) == (1, 1)
 
 
-def test_nan_in_a_message_is_no_position():
-    nan = float("nan")
-    assert CameraTrackingGeo.decode(Source(11, 100), (0, 0, nan, *[nan] * 9, 1, 0)) is None
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_a_place_that_is_no_number_is_counted_as_bad_and_dropped(value):
+    codec = Codec()
+    assert codec.feed(codec.encode(SAID._replace(altitude=value))) == []
+    assert (codec.counters.good, codec.counters.bad) == (0, 1)
+
+
+def test_an_accuracy_that_is_no_number_is_unknown_and_the_configured_one_counts():
+    """NaN is what cameras fill in for what they do not know."""
+    nan, codec = float("nan"), Codec()
+    bare = SAID._replace(horizontal_accuracy=nan, vertical_accuracy=nan, heading_accuracy=nan)
+    (said,) = codec.feed(codec.encode(bare))
+    sigmas = []
+    for share in (0.05, 0.2):
+        of, now = started(sigma_range_share=share)
+        give(of, now, "autopilot", (view(OWN, 100, now - START - 150_000, CAMERA), said))
+        assert (of.target.counts.used, of.target.counts.invalid) == (1, 0)
+        sigmas.append(of.target.last(now).sigma)
+    assert sigmas[1] > 1.5 * sigmas[0]
 
 
 def test_own_detections_are_forwarded_once_with_the_time_of_their_image():

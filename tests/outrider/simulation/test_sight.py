@@ -14,6 +14,7 @@ from mavlink_bridge.tlog.log import read_tlog
 from mavlink_bridge.wire.codec import Codec
 from outrider.runs.surfaces import Surfaces
 from outrider.scenarios.scenario import Scenario
+from outrider.scene.camera_view import CameraReceiver
 from outrider.scene.changes import Change
 from outrider.simulation import sight
 from outrider.simulation.fleet import Fleet
@@ -28,6 +29,7 @@ CAMERA: dict[str, Any] = {
     "latency_ms": 150.0,
     "rate_hz": 20.0,
 }
+TILTED: dict[str, Any] = {"kind": "fixed", "pitch_deg": 40.0}
 SIGHT: dict[str, Any] = {
     "vehicles": 3,
     "airborne": True,
@@ -103,6 +105,36 @@ def test_cameras_see_where_the_target_was_when_the_image_was_taken(tmp_path: Pat
             assert true is not None
             if abs(time - moved[0]) > 30_000:
                 assert place == pytest.approx(true + SHIFT * (time > moved[0]), abs=0.03)
+
+
+@pytest.mark.slow
+def test_a_field_of_view_tilts_with_the_vehicle_in_live_pictures_and_in_those_from_logs(
+    tmp_path: Path,
+) -> None:
+    """A camera that is fixed to its vehicle: both pictures have the true attitude of the image."""
+    live: list[np.ndarray] = []
+    of = scenario("walk", **{**EXACT, "vehicles": 2, "camera": {**CAMERA, "mount": TILTED, "missed": 0.0}})
+    flight, _ = flown(
+        of, tmp_path / "run", onlooker=lambda flying, now: live.append(flying.snapshots(now)[0].view)
+    )
+    camera, frame, codec = CameraReceiver(), flight.fleet.frame, Codec()
+    logged = []
+    for record in read_tlog(tmp_path / "run" / f"vehicle-{flight.systems[0]}.tlog"):
+        for message in codec.feed(record.frame):
+            if message.source.system == flight.systems[0] and isinstance(message, CameraFovStatus):
+                camera.receive(message, frame)
+                logged.append(camera.row[:7].copy())
+    shown = np.unique(np.array([row[:7] for row in live if np.isfinite(row[:7]).all()]), axis=0)
+    rows = np.array(logged)
+    assert len(shown) > 10
+    # Each live picture is one of the log's: places to what messages resolve, attitudes to float32.
+    apart = np.abs(shown[:, None] - rows[None])
+    matched = (apart[..., :3].max(axis=2) < 0.03) & (apart[..., 3:].max(axis=2) < 1e-3)
+    assert matched.any(axis=1).all()
+    # On a level vehicle the camera's right side is level: that of a quaternion (w, x, y, z) points down by
+    # 2 (y z + w x).
+    w, x, y, z = shown[:, 3:].T
+    assert np.abs(2.0 * (y * z + w * x)).max() > 0.03
 
 
 def test_without_cameras_nothing_is_shown() -> None:
