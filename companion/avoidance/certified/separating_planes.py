@@ -167,13 +167,17 @@ def _nearest(triangle: Array, candidate: Array, best: Array) -> None:
                     after[j] - end[j]
                 )
             if _dot(candidate, start) < 0.0:
-                candidate *= -1.0
+                for i in range(3):
+                    candidate[i] = -candidate[i]
         norm = sqrt(_dot(candidate, candidate))
-        candidate /= norm if norm >= _TINY else np.inf
+        # Loops, because an operation on arrays of three takes several times as long.
+        for i in range(3):
+            candidate[i] /= norm if norm >= _TINY else np.inf
         margin = min(_dot(candidate, triangle[0]), _dot(candidate, triangle[1]), _dot(candidate, triangle[2]))
         if margin > furthest:
             furthest = margin
-            best[:] = candidate
+            for i in range(3):
+                best[i] = candidate[i]
     if best[0] == 0.0 and best[1] == 0.0 and best[2] == 0.0:
         best[0] = 1.0
 
