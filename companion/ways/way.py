@@ -30,7 +30,8 @@ _SEEN = 0.85
 _MOVED_M = 0.5
 """Distance by which the destination or the vehicle must have moved before a search is repeated."""
 _JUMP_M = 2.0
-"""Distance from plan to plan from which on the destination is another one, and none that moves."""
+"""Distance from which on the destination is another one: from where it would be if it moved on as before."""
+_AT_REST: Array = np.zeros(3)
 
 
 class Way:
@@ -60,6 +61,7 @@ class Way:
         self._search: Generator[None, None, Found | None] | None = None
         self._ends: tuple[Array, Array] | None = None
         self._goal: Array | None = None
+        self._step = _AT_REST
         self._floor = -inf
         self.begun = 0
         """Number of ways that were begun."""
@@ -71,7 +73,7 @@ class Way:
     def forget(self) -> None:
         """Drop the way and the search of one, because the next destination is another one."""
         self._followed = self._search = self._ends = self._lower = self._goal = None
-        self.enclosed = False
+        self._step, self.enclosed = _AT_REST, False
 
     def keep_above(self, floor: float) -> None:
         """Search ways at the height ``floor`` (m) or above from now on; the present one is dropped."""
@@ -85,8 +87,11 @@ class Way:
         Call it once for each plan. Without a way, or where the straight way is free, it is the goal. From a
         destination that jumps no way and no search is kept.
         """
-        if self._goal is not None and float(np.abs(self._goal - goal).max()) > _JUMP_M:
-            self.forget()
+        if self._goal is not None:
+            step = goal - self._goal
+            if float(np.abs(step - self._step).max()) > _JUMP_M:
+                self.forget()
+            self._step = step
         self._goal = goal
         clear = self._clear
         if clear is None:

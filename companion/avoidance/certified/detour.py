@@ -49,8 +49,8 @@ class Detour:
         ``stalled``: there is no progress. ``discs`` returns what a way must avoid, in order of preference.
         Without a way, the sub-goal is the goal.
         """
-        if self._way is None and not stalled:
-            self._looking = None
+        # A search that has begun is ended: a way that was blocked is searched anew without a stall.
+        if self._way is None and self._looking is None and not stalled:
             return Subgoal(goal, 0.0)
         choices = discs()
         here, there = rest[:2], goal[:2]

@@ -313,6 +313,19 @@ def test_after_the_destination_has_jumped_nothing_leads_to_the_old_one() -> None
     assert searching.towards(INSIDE, home).place is home
 
 
+def test_the_search_of_a_way_to_a_destination_that_moves_fast_comes_to_an_end() -> None:
+    """It moves by more in a plan than one that jumps."""
+    searching = way(POCKET, parts=1)
+    plans = 0
+    for plans in range(400):
+        angle = plans * 2.2 / 3.5
+        searching.towards(INSIDE, np.array([7.0 + 2.5 * np.cos(angle), 3.5 * np.sin(angle), 5.0]))
+        if searching.begun:
+            break
+    assert searching.begun == 1
+    assert plans > 1
+
+
 @pytest.mark.parametrize(("floor", "passes"), [(3.0, True), (3.9, True), (4.1, False), (9.0, False)])
 def test_no_way_leads_below_the_floor(floor: float, passes: bool) -> None:
     """A wall from side to side that hangs from the ceiling down to 5 m."""

@@ -242,6 +242,29 @@ def test_no_plan_does_more_than_a_part_of_a_search(closed: bool, monkeypatch: py
         )
 
 
+def test_a_blocked_way_is_searched_anew_without_a_stall() -> None:
+    """The search takes several plans; there is progress in them, because the deadlock's turn began anew."""
+    here, there, discs = boxes(1)
+    open_ = discs._replace(centres=np.delete(discs.centres, [5, 6, 7], axis=0), radii=discs.radii[3:])
+    limits = LimitsConfig(box_min=(-30.0, -30.0, 3.0), box_max=(30.0, 30.0, 10.0))
+    detour, plan = Detour(limits, 3.0), 0
+    rest, goal = np.array([*here, 5.0]), np.array([*there, 5.0])
+    while not detour.begun:
+        detour.towards(200_000 * plan, rest, goal, lambda: [open_], stalled=True)
+        plan += 1
+    aside = detour.towards(200_000 * plan, rest, goal, lambda: [open_], stalled=False).place
+    off = aside - rest
+    blocking = open_._replace(
+        centres=np.vstack([open_.centres, (rest + 0.7 * off)[:2]]), radii=np.append(open_.radii, 0.5)
+    )
+    for later in range(plan + 1, plan + 40):
+        found = detour.towards(200_000 * later, rest, goal, lambda: [blocking], stalled=False).place
+        if detour.begun == 2:
+            break
+    assert detour.begun == 2
+    assert np.abs(found - aside).max() > 0.1
+
+
 POCKET = np.array(
     [[-3.0, 2.0], [-3.0, 0.0], [-2.6, -2.0], [-1.0, -3.2], [1.0, -3.2], [2.6, -2.0], [3.0, 0.0], [3.0, 2.0]]
 )
