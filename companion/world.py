@@ -127,7 +127,7 @@ class World:
         elif self.cameras is not None and isinstance(message, CAMERA_MESSAGES):
             self._receive_camera(now, link, message)
         elif self.cameras is not None and isinstance(message, GimbalAttitude):
-            self.cameras.turned(self._own.when(now, message.time_boot), message)
+            self._receive_gimbal(now, message)
         elif isinstance(self.target, Target) and (link == "target" or isinstance(message, CameraTrackingGeo)):
             self.target.receive(now, link, message)
         elif isinstance(message, ObstacleDistance):
@@ -261,6 +261,16 @@ class World:
             self.cameras.own(
                 now, message, lambda stamp: self._own.dated(now, stamp), lambda: self._own.at(now)
             )
+
+    def _receive_gimbal(self, now: int, message: GimbalAttitude) -> None:
+        """Process a gimbal's attitude, dated by its stamp only if the autopilot itself sends it.
+
+        Another component's stamps may be of a boot clock of its own.
+        """
+        if self.cameras is None:
+            return
+        by_autopilot = message.source.component == mavlink.MAV_COMP_ID_AUTOPILOT1
+        self.cameras.turned(self._own.when(now, message.time_boot) if by_autopilot else now, message)
 
     def _receive_distances(self, now: int, message: ObstacleDistance) -> None:
         """Process an OBSTACLE_DISTANCE of the own system, with the vehicle's pose at measurement time."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import deque
-from math import cos, radians, sin, sqrt
+from math import atan2, cos, radians, sin, sqrt
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -31,40 +31,53 @@ class CameraPose:
         self._mount = _about_y(-radians(optics.pitch_deg))
         self._body = _Turns()
         self._gimbal = _Turns()
+        self._on_gimbal = False
 
     def receive_attitude(self, time: int, message: Attitude) -> None:
         """Receive the vehicle's attitude at ``time``."""
-        self._body.add(time, _of_euler(message.roll, message.pitch, message.yaw), message.yaw)
+        self._body.add(time, _of_euler(message.roll, message.pitch, message.yaw))
 
     def receive_gimbal(self, time: int, message: GimbalAttitude) -> None:
-        """Receive the gimbal's attitude at ``time``; without a known yaw it is ignored."""
-        attitude, heading = message.attitude, message.delta_yaw
+        """Receive the gimbal's attitude at ``time``; without a known yaw it is not used."""
+        self._on_gimbal = True
+        attitude = message.attitude
         if not message.flags & _TO_NORTH or message.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME:
-            if heading is None:
-                heading = self._body.yaw
+            # MAVLink truncates zeros at the end of a message: a difference of yaws that was not sent, and one
+            # of exactly 0, look alike. Both count as unknown, as NaN does (None); then the vehicle's heading
+            # counts, which is correct in both cases.
+            heading = message.delta_yaw or self._heading(time)
             if heading is None:
                 return
             attitude = product(_about_z(heading), attitude)
-        self._gimbal.add(time, attitude, 0.0)
+        self._gimbal.add(time, attitude)
 
     def at(self, time: int) -> Quaternion | None:
-        """Return the camera's attitude at ``time``; None if none is known from about then."""
-        turned = self._gimbal.at(time)
-        if turned is not None:
-            return turned
+        """Return the camera's attitude at ``time``; None if none is known from about then.
+
+        Since the first message of a gimbal, only the gimbal's attitude counts.
+        """
+        if self._on_gimbal:
+            return self._gimbal.at(time)
         body = self._body.at(time)
         return None if body is None else product(body, self._mount)
 
+    def _heading(self, time: int) -> float | None:
+        """Return the vehicle's yaw (rad) at ``time``; None if none is known from about then."""
+        body = self._body.at(time)
+        if body is None:
+            return None
+        w, x, y, z = body
+        return atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
 
 class _Turns:
-    """Attitudes in the order of their times; ``yaw``: of the last one, None before the first."""
+    """Attitudes in the order of their times."""
 
     def __init__(self) -> None:
         self._times: deque[int] = deque(maxlen=_KEPT)
         self._attitudes: deque[Quaternion] = deque(maxlen=_KEPT)
-        self.yaw: float | None = None
 
-    def add(self, time: int, attitude: Quaternion, yaw: float) -> None:
+    def add(self, time: int, attitude: Quaternion) -> None:
         """Add an attitude at ``time``; one that is not later than the last one is ignored."""
         norm = sqrt(sum(part * part for part in attitude))
         if (self._times and time <= self._times[-1]) or not norm > 0.0:
@@ -72,7 +85,6 @@ class _Turns:
         w, x, y, z = attitude
         self._times.append(time)
         self._attitudes.append((w / norm, x / norm, y / norm, z / norm))
-        self.yaw = yaw
 
     def at(self, time: int) -> Quaternion | None:
         """Return the attitude at ``time``, between two that are near, or else the nearest one."""

@@ -242,7 +242,8 @@ class GimbalAttitude(NamedTuple):
 
     ``flags``: GIMBAL_DEVICE_FLAGS, which say whether yaw is relative to north or to the vehicle's heading.
     ``body_rates`` rad/s. ``delta_yaw`` (rad) and its rate (rad/s): yaw relative to north minus yaw relative
-    to the vehicle's heading. They are None if unknown.
+    to the vehicle's heading. They are None if unknown. They are extension fields: a sender that does not know
+    these fields, and one that sends exactly 0, both give 0.0.
     """
 
     source: Source

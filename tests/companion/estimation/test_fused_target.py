@@ -254,6 +254,75 @@ def test_a_gimbal_says_where_a_camera_without_a_field_of_view_looks(relative):
     assert of.target.last(now).position == pytest.approx(PLACE, abs=0.1)
 
 
+LEVEL = quaternion(0.0, -0.6, 0.0)
+WEST = product(quaternion(0.0, 0.0, -0.5 * np.pi), LEVEL)
+NORTHWARD = 12 | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+"""Roll and pitch are relative to the horizon, yaw to north."""
+
+
+def gimbal(stamp: int, attitude, component: int = 154, flags: int = NORTHWARD) -> GimbalAttitude:
+    return GimbalAttitude(Source(OWN, component), stamp, flags, attitude, None)
+
+
+def test_a_camera_on_a_gimbal_is_never_taken_as_fixed_to_the_vehicle():
+    """Of the time of the image only the vehicle's attitude is known: the gimbal's is 0.3 s older."""
+    of, now = started(optics={**OPTICS, "pitch_deg": 35.0}, latency_us=100_000)
+    give(of, now - 400_000, "autopilot", [gimbal(now - 400_000 - START, WEST)])
+    turning(of, now, roll=0.0)
+    give(of, now, "autopilot", [in_image(WEST)])
+    assert (of.target.counts.invalid, of.target.last(now)) == (1, None)
+
+
+@pytest.mark.parametrize("ahead", [-1_500_000, -150_000, 150_000, 10**9])
+def test_a_gimbal_with_a_boot_clock_of_its_own_is_dated_by_its_arrival(ahead):
+    of, now = started(optics=OPTICS, latency_us=100_000)
+    for age, attitude in ((200_000, LEVEL), (100_000, WEST), (0, LEVEL)):
+        of.receive(now - age, "autopilot", gimbal(now - age - START + ahead, attitude))
+    give(of, now, "autopilot", [in_image(WEST)])
+    assert of.target.counts.invalid == 0
+    assert of.target.last(now).position == pytest.approx(PLACE, abs=0.1)
+
+
+def test_a_gimbal_of_the_autopilot_is_dated_by_its_stamp():
+    of, now = started(optics=OPTICS, latency_us=100_000)
+    for age, attitude in ((100_000, LEVEL), (0, WEST)):
+        of.receive(now - age, "autopilot", gimbal(now - age - START - 105_000, attitude, component=1))
+    give(of, now, "autopilot", [in_image(WEST)])
+    assert of.target.counts.invalid == 0
+    assert of.target.last(now).position == pytest.approx(PLACE, abs=0.1)
+
+
+@pytest.mark.parametrize("delta", [0.0, None], ids=["left out", "NaN"])
+def test_without_the_difference_of_yaws_a_gimbals_yaw_is_relative_to_the_vehicles_heading(delta):
+    """A message without extension fields is decoded with zeros."""
+    of, now = started(optics=OPTICS)
+    turning(of, now, roll=0.3)
+    said, codec = gimbal(now - START, LEVEL, flags=12), Codec()
+    (said,) = codec.feed(codec.encode(said._replace(delta_yaw=delta, delta_yaw_rate=delta)))
+    give(of, now, "autopilot", [said, in_image(WEST)])
+    assert of.target.counts.invalid == 0
+    assert of.target.last(now).position == pytest.approx(PLACE, abs=0.1)
+
+
+def test_the_vehicles_heading_is_that_at_the_gimbals_time():
+    """The vehicle looked west 100 ms ago, and looks north since."""
+    of, now = started(optics=OPTICS, latency_us=100_000)
+    for age, yaw in ((100_000, -0.5 * np.pi), (0, 0.0)):
+        said = Attitude(Source(OWN, 1), now - age - START - 5_000, 0.2, -0.1, yaw, (0.0, 0.0, 0.0))
+        of.receive(now - age, "autopilot", said)
+    said = gimbal(now - START - 105_000, LEVEL, component=1, flags=12)
+    give(of, now, "autopilot", [said, in_image(WEST)])
+    assert of.target.counts.invalid == 0
+    assert of.target.last(now).position == pytest.approx(PLACE, abs=0.1)
+
+
+def test_a_gimbals_yaw_without_a_heading_of_its_time_is_not_used():
+    of, now = started(optics=OPTICS)
+    turning(of, now - 500_000, roll=0.0)
+    give(of, now, "autopilot", [gimbal(now - START, LEVEL, flags=12), in_image(WEST)])
+    assert (of.target.counts.invalid, of.target.last(now)) == (1, None)
+
+
 def test_an_image_without_a_field_of_view_and_without_optics_is_counted_and_dropped():
     of, now = started()
     turning(of, now, roll=0.0)

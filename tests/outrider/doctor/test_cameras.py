@@ -8,6 +8,7 @@ import pytest
 
 from mavlink_bridge.messages import (
     CameraFovStatus,
+    CameraInformation,
     CameraTrackingGeo,
     CameraTrackingImage,
     CommandLong,
@@ -138,6 +139,20 @@ def test_another_clock_than_the_autopilots_is_a_warning(stamp: int) -> None:
     rig.run(5.0)
     finding = found(rig.consult(beside=frames(geo, view)), "camera 11/101 has another clock")
     assert finding.severity is WARNING
+
+
+@pytest.mark.parametrize(
+    ("focal_length", "sensor_size"),
+    [(4.0, (0.0, 0.0)), (4.0, (6.0, 0.0)), (4.0, (-6.0, 4.0)), (0.0, (6.0, 4.0)), (-4.0, (6.0, 4.0))],
+)
+def test_optics_that_are_not_positive_are_unknown(
+    focal_length: float, sensor_size: tuple[float, float]
+) -> None:
+    said = CameraTrackingImage(OTHER, 1, 2, 4, None, None, (0.4, 0.3, 0.6, 0.7))
+    about = CameraInformation(OTHER, 0, "", "", 0, focal_length, sensor_size, (1280, 720), 0)
+    verdict = Bench(autopilot()).consult(beside=frames(said, about))
+    assert found(verdict, "camera 11/101 does not tell its optics").severity is WARNING
+    assert not [finding for finding in verdict.findings if "target_source.optics: {" in finding.do]
 
 
 VIEW = CameraFovStatus(Source(12, 191), 1000, (47.0, 8.0, 400.0), None, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0)

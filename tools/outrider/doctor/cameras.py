@@ -167,14 +167,17 @@ def _image(name: str, camera: SenderRecord, case: Case) -> Iterator[Finding]:
 def _optics(name: str, camera: SenderRecord) -> Finding:
     """Return the finding about the angles of view of a camera that does not send them with its images."""
     about = camera.latest(CameraInformation)
-    if about is None or not about.focal_length or not about.sensor_size:
+    focal_length = (about.focal_length if about else None) or 0.0
+    sides = (about.sensor_size if about else None) or (0.0, 0.0)
+    # Zero is what a field holds that was never set.
+    if min(focal_length, *sides) <= 0.0:
         return Finding(
             f"{name} does not tell its optics",
             Severity.WARNING,
             "Without angles of view, a place in the image has no direction: its detections are dropped.",
             "State width_deg and height_deg of target_source.optics in the companion's settings.",
         )
-    across, down = (degrees(2.0 * atan(0.5 * side / about.focal_length)) for side in about.sensor_size)
+    across, down = (degrees(2.0 * atan(0.5 * side / focal_length)) for side in sides)
     return Finding(
         f"{name} does not tell its angles of view with its images",
         Severity.NOTE,
