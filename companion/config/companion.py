@@ -169,6 +169,9 @@ class CompanionConfig(Settings):
         for name in ("tangential", "approach_angle"):
             if name in self.methods and getattr(self, name).force_max <= max(self.limits.u_max):
                 raise ValueError(f"{name}.force_max must exceed u_max, or the input cancels it")
+        committed = self.avoidance == "certified" and self.planar
+        if self.way is not None and self.way.lanes is not None and not committed:
+            raise ValueError("way.lanes: allowed only with avoidance: certified and planar: true")
         if len(set(self.methods)) != len(self.methods):
             raise ValueError("methods: a method is there twice; allowed: once")
         systems = [one.system for one in self.moving]

@@ -21,6 +21,14 @@ class WayConfig(Settings):
     most_cells: int = Field(
         150_000, ge=1_000, le=2_000_000, description="larger cells are used where the box would hold more"
     )
+    lanes: float | None = Field(
+        None,
+        ge=0.1,
+        le=20.0,
+        description="m, distance of the places of a lattice on which vehicles that meet in a lane which they"
+        " cannot share give way to each other, the smaller id first; a little more than the least distance of"
+        " two plans; with committed plans that are planar; null: they do not",
+    )
     parts: int = Field(
         10,
         ge=1,

@@ -21,6 +21,7 @@ from companion.values.horizon import Array
 from companion.ways.clearance import Clearance, clearance_of
 from companion.ways.finding import Found, finding
 from companion.ways.followed import Followed
+from companion.ways.lanes import Lanes
 from companion.ways.subgoal import Subgoal
 
 _SHARES = (1.0, 0.5, 0.0)
@@ -62,6 +63,7 @@ class Way:
         self._ends: tuple[Array, Array] | None = None
         self._goal: Array | None = None
         self._step = _AT_REST
+        self._lanes: Lanes | None = None
         self._floor = -inf
         self.begun = 0
         """Number of ways that were begun."""
@@ -119,6 +121,13 @@ class Way:
         if self._level == self._level:
             subgoal.place[2] = height
         return subgoal
+
+    def lanes(self) -> Lanes | None:
+        """Return the lanes at the height of a planar vehicle; None without ``way.lanes``, and at first."""
+        clear, apart = self._clear, self._config.lanes
+        if self._lanes is None and clear is not None and apart is not None and self._level == self._level:
+            self._lanes = Lanes(clear, self._clearances[-1], apart)
+        return self._lanes
 
     def _clearance(self, level: float | None) -> Clearance:
         """Return the clearances in the box, or at a ``level`` (m)."""

@@ -268,6 +268,11 @@ class Agreements:
         found = [peer.plans.newest for _, peer in sorted(self._peers.items()) if peer.left is None]
         return [plan for plan in found if plan is not None]
 
+    def ends(self) -> dict[int, Array]:
+        """Return where the newest plan of each peer that has not said farewell ends (3,), m, by system id."""
+        known = ((s, peer.plans.newest) for s, peer in self._peers.items() if peer.left is None)
+        return {system: plan.controls[-1, 2] for system, plan in known if plan is not None}
+
     @property
     def columns(self) -> frozenset[int]:
         """Systems whose newest plan is a column, without those that said farewell: they make no other."""

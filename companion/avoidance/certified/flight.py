@@ -27,6 +27,7 @@ from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
 from companion.ways import way_of
+from companion.ways.lanes import Traveller
 from companion.ways.subgoal import Subgoal
 from companion.world import View, World
 from mavlink_bridge.errors import PlanWireError
@@ -36,11 +37,17 @@ from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import Statement, in_messages
 from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
+from mavlink_bridge.wire.goal import PAYLOAD_TYPE as GOAL
+from mavlink_bridge.wire.goal import WireGoal, goal_at
+from mavlink_bridge.wire.goal import pack as pack_goal
+from mavlink_bridge.wire.goal import unpack as unpack_goal
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack
 
 _TURNING_SENSES = {"left": -1.0}
 _EFFORT = 2
 """How much of a search is done for a plan."""
+_REACHED_M = 0.2
+"""Distance of the end of the plan from a goal that counts as reached, and by which a goal may move."""
 
 
 class CertifiedFlight:
@@ -96,6 +103,11 @@ class CertifiedFlight:
         self.left_tube = 0
         """Number of times that the vehicle left the tube."""
         self._outside = 0.0
+        self._origin = fleet.fingerprint
+        self._told: dict[int, WireGoal] = {}
+        self._reached = False
+        self._goal: Array | None = None
+        self._in_lane = False
         self._in_control = self._announced = self._received = self._participated = False
         self._turn = 0
         self._polled_at: int | None = None
@@ -112,6 +124,9 @@ class CertifiedFlight:
             return
         if message.payload_type == PAYLOAD_TYPE:
             self.agreements.receive_plan(now, system, message.payload)
+        elif message.payload_type == GOAL:
+            self._hear_goal(system, message.payload)
+            return
         elif message.payload_type == AGREEMENTS:
             try:
                 self.agreements.receive_statement(now, system, unpack_statement(message.payload))
@@ -120,6 +135,16 @@ class CertifiedFlight:
         else:
             return
         self._received = True
+
+    def _hear_goal(self, system: int, payload: bytes) -> None:
+        """Keep the goal that ``system`` tells, unless it cannot be decoded or is in another frame."""
+        try:
+            goal = unpack_goal(payload)
+        except PlanWireError:
+            self.agreements.refused += 1
+            return
+        if goal.origin == self._origin:
+            self._told[system] = goal
 
     def stand(self, now: int, position: Array) -> None:
         """While not in control, continue the committed plan, or hold ``position`` (3,), m.
@@ -329,7 +354,9 @@ class CertifiedFlight:
         subgoal = self._subgoal(now, epoch, own[-1, 2], aim.destination)
         anticipates = self._config.certified.anticipation.most > 0.0 and aim.path is None
         turn = self._anticipated(epoch, own, subgoal.place) if anticipates else 0.0
-        goal = self._deadlock_turn.turned(start.position_m, subgoal.place, turn)
+        goal = subgoal.place
+        if not self._in_lane:
+            goal = self._deadlock_turn.turned(start.position_m, goal, turn)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 
@@ -341,6 +368,12 @@ class CertifiedFlight:
         way, detour = self._way, self._detour
         begun = detour.begun, 0 if way is None else way.begun
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
+        in_lane = self._lane(rest, destination)
+        if self._in_lane != (in_lane is not None):
+            self._in_lane = in_lane is not None
+            self._deadlock_turn.restart()
+        if in_lane is not None:
+            return in_lane
         subgoal = detour.towards(
             now,
             rest,
@@ -351,6 +384,24 @@ class CertifiedFlight:
         if (detour.begun, 0 if way is None else way.begun) != begun:
             self._deadlock_turn.restart()
         return subgoal._replace(beyond=subgoal.beyond + goal.beyond)
+
+    def _lane(self, rest: Array, destination: Array) -> Subgoal | None:
+        """Return where to aim for among vehicles that cannot pass; None where none is met."""
+        if self._goal is None or float(np.abs(self._goal - destination).max()) > _REACHED_M:
+            self._reached = False
+        self._goal = destination
+        self._reached |= float(np.abs(rest - destination).max()) < _REACHED_M
+        lanes = None if self._way is None else self._way.lanes()
+        if lanes is None:
+            return None
+        ends = self.agreements.ends()
+        travellers = {}
+        for system, end in ends.items():
+            told = self._told.get(system)
+            goal, reached = (end, True) if told is None else (told.position_m, told.reached)
+            travellers[system] = Traveller(end, goal, reached)
+        travellers[self._own.system] = Traveller(rest, destination, self._reached)
+        return lanes.subgoal(self._own.system, travellers)
 
     def _anticipated(self, epoch: int, own: Array, goal: Array) -> float:
         """Return the turn (rad) of ``goal`` (3,), m, for encounters with the peers' newest plans.
@@ -425,7 +476,17 @@ class CertifiedFlight:
             self.agreements.leave(announced.epoch)
         statements = self._statements(announced.epoch, every=True, farewell=farewell)
         plans = [announced, *self._repeated()]
-        return [*sync, *(Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan)) for plan in plans), *statements]
+        tunnels = [Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan)) for plan in plans]
+        return [*sync, *tunnels, *statements, *self._tell_goal()]
+
+    def _tell_goal(self) -> list[Message]:
+        """Return the message of the own goal, where vehicles give way to each other in lanes."""
+        way = self._config.way
+        if way is None or way.lanes is None or self._goal is None:
+            return []
+        return [
+            Tunnel(self._own, 0, 0, GOAL, pack_goal(goal_at(self._goal, self._origin, reached=self._reached)))
+        ]
 
     def _away(self, now: int) -> list[Message]:
         """Return the statement that another controller flies the vehicle, if plans were announced before."""

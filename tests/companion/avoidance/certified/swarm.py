@@ -283,20 +283,19 @@ class Swarm:
         planar: bool = False,
         settings: Mapping[str, object] | None = None,
         v_max: tuple[float, float, float] | None = None,
+        more: Mapping[str, object] | None = None,
     ) -> None:
-        """``others``: other certified settings of some vehicles, by system id; ``settings``: of all."""
+        """``others``: other certified settings of some vehicles, by system id; ``settings``: of all.
+
+        ``more``: other values of the companions' settings.
+        """
         fleet = tuple(range(1, len(starts) + 1))
         expected: dict[str, object] = {"epoch_us": epoch, "fleet": () if strangers else fleet}
         certified = CertifiedConfig.model_validate({**expected, **(settings or {})})
         limits = LimitsConfig() if v_max is None else LimitsConfig(v_max=v_max)
-        self.config = CompanionConfig(
-            task="goto",
-            avoidance="certified",
-            turning_sense="right",
-            certified=certified,
-            planar=planar,
-            limits=limits,
-        )
+        document: dict[str, object] = {"task": "goto", "avoidance": "certified", "turning_sense": "right"}
+        document |= {"certified": certified, "planar": planar, "limits": limits, **(more or {})}
+        self.config = CompanionConfig.model_validate(document)
         self.d = between(self.config.certified, self.config.field, self.config.limits)
         self._further = further(self.config.certified)
         self.vehicles = [
