@@ -81,8 +81,6 @@ def test_one_number_bounds_each_axis(bounds: str) -> None:
 def test_lanes_need_committed_plans_in_a_plane(avoidance: str, planar: bool) -> None:
     """Only there vehicles tell their goals, and only in a plane is it known where two cannot pass."""
     settings = {"avoidance": avoidance, "planar": planar, "way": {"lanes": 0.5}}
-    with pytest.raises(
-        ValueError, match=r"way\.lanes: allowed only with avoidance: certified"
-    ):
+    with pytest.raises(ValueError, match=r"way\.lanes: allowed only with avoidance: certified"):
         CompanionConfig.model_validate(settings)
     CompanionConfig.model_validate({**settings, "avoidance": "certified", "planar": True})
