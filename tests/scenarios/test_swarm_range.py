@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from outrider.realtime.flight import RealTimeFlight
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.flight import Flight
 from outrider.simulation.preparation import prepared
+from outrider.yaml_files.yaml_file import load
 from tests.scenarios.lockstep_flights import FIREFLY, Flown, fly, scenario
 from tests.scenarios.test_same_seed import facts, logs
 
@@ -73,10 +75,11 @@ def test_only_one_process_has_all_places(tmp_path: Path) -> None:
         RealTimeFlight(OF, FIREFLY, 5, tmp_path, tmp_path)
 
 
-def certified(**settings: object) -> Scenario:
+def certified(radio: float | None = None, **settings: object) -> Scenario:
     limits = {"v_max": [1.5, 1.5, 0.5]}
     companion = {"avoidance": "certified", "certified": settings, "limits": limits}
-    return scenario("antipodal-8", {"airborne": True, "companion": companion})
+    links = {"swarm": {"range": radio}}
+    return scenario("antipodal-8", {"airborne": True, "companion": companion, "links": links})
 
 
 def test_certified_flights_that_no_range_allows_are_refused() -> None:
@@ -88,3 +91,24 @@ def test_certified_flights_that_no_range_allows_are_refused() -> None:
     grounded = certified(range=15.0).model_copy(update={"airborne": False})
     with pytest.raises(InputError, match=r"airborne is false: columns are not agreed"):
         prepared(grounded, "a file")
+
+
+def test_radios_must_reach_so_far_that_who_leaves_is_heard_beyond_the_range() -> None:
+    """By two margins and what two vehicles part in an epoch; the error gives a value that is allowed."""
+    settings = {"range": 15.0, "tube": 0.5, "clock_us": 0, "sigmas": 0.0, "epoch_us": 200_000}
+    least = 15.0 + 2.0 * 0.5 + 2.0 * 0.2 * np.sqrt(1.5**2 + 1.5**2 + 0.5**2)
+    with pytest.raises(InputError, match=r"links\.swarm\.range is 15 m, so that .* more than") as error:
+        prepared(certified(15.0, **settings), "a file")
+    named = re.search(r"more than ([\d.]+) m", str(error.value))
+    assert named is not None
+    assert 0.0 <= float(named[1]) - least < 0.001
+    prepared(certified(float(named[1]) + 0.001, **settings), "a file")
+    with pytest.raises(InputError, match="is not heard to leave"):
+        prepared(certified(least - 1e-6, **settings), "a file")
+
+
+def test_the_radios_of_the_comparison_reach_far_enough() -> None:
+    path = Path("config/comparisons/scenarios/range.yaml")
+    of = load(path, Scenario)
+    assert of.links.swarm.range is not None
+    prepared(of, str(path))

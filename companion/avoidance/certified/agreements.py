@@ -8,7 +8,7 @@ agreement before it has begun anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -40,7 +40,8 @@ class Agreements:
 
     ``beyond``: test whether a plan, at a time (µs), shows that its vehicle is beyond the range; None: there
     is no range. With a range, peers are those that were last heard within it, the expected ones and those
-    that others name are none, and those that were heard beyond it are kept apart: they cost nothing.
+    that others name are none, and those that were heard beyond it are kept apart (``distant``): they cost
+    nothing.
     ``steps``: number of knots of every plan. ``since``: epoch (µs) of the first plan since which each own
     plan began on the one before; it changes when the vehicle returns, not at its farewell. ``refused`` counts
     the messages that were not accepted.
@@ -159,18 +160,25 @@ class Agreements:
         """
         self.refused += 1
         self._differing[system] = now
-        peer = self._peers.get(system)
+        held = self._distant if system in self._distant else self._peers
+        peer = held.get(system)
         if peer is None:
             return
         if peer.stated:
             peer.contradict(now)
         elif system not in self._config.fleet:
-            del self._peers[system]
+            del held[system]
             self._members = None
 
     def _unknown_differs(self, now: int, system: int) -> bool:
         """Return whether ``system`` is no peer, and has lately sent a statement of another fleet."""
-        return system not in self._peers and system in _recent(self._differing, now)
+        known = system in self._peers or system in self._distant
+        return not known and system in _recent(self._differing, now)
+
+    def _everybody(self) -> Iterator[Peer]:
+        """Yield the peers, and those that were heard beyond the range."""
+        yield from self._peers.values()
+        yield from self._distant.values()
 
     def _known(self, system: int) -> Peer:
         if system in self._distant:
@@ -186,7 +194,7 @@ class Agreements:
         """Discard all agreements: the own plan of ``since`` (µs) does not begin on the one before."""
         self.since, self._farewell = since, None
         self._plans.clear()
-        for peer in self._peers.values():
+        for peer in self._everybody():
             peer.begin()
 
     def leave(self, epoch: int) -> None:
@@ -195,7 +203,7 @@ class Agreements:
         What others do until the own return may not be received, so each of them must be heard anew then.
         """
         self._farewell, self._members = epoch, None
-        for peer in self._peers.values():
+        for peer in self._everybody():
             peer.leave(epoch)
 
     def rejoin(self) -> bool:
@@ -203,7 +211,7 @@ class Agreements:
         if self._farewell is None:
             return False
         self.since, self._farewell = self._farewell + self._config.epoch_us, None
-        for peer in self._peers.values():
+        for peer in self._everybody():
             peer.begin()
         return True
 
@@ -241,8 +249,23 @@ class Agreements:
 
     @property
     def left(self) -> dict[int, StoredPlan]:
-        """Last plans of the vehicles that said farewell, by system id."""
-        return {system: peer.left for system, peer in self._peers.items() if peer.left is not None}
+        """Last plans of the vehicles that said farewell, by system id, also of those beyond the range.
+
+        They stay there, and may be silent when this vehicle comes.
+        """
+        return {peer.pair.peer: peer.left for peer in self._everybody() if peer.left is not None}
+
+    @property
+    def distant(self) -> dict[int, int]:
+        """Vehicles that fly plans beyond the range, and when (µs) the last plan or statement of each came.
+
+        Those that said farewell, or that another controller flies, are not among them.
+        """
+        return {
+            system: peer.last_received
+            for system, peer in self._distant.items()
+            if peer.last_received is not None and peer.left is None and not peer.away
+        }
 
     @property
     def away(self) -> frozenset[int]:
@@ -400,7 +423,7 @@ class Agreements:
         """Return the senders whose plans are refused at ``now`` (µs)."""
         foreign = _recent(self._foreign, now)
         differing = (_recent(self._differing, now) | _recent(self._other_knots, now)) - foreign
-        doubled = {system for system, peer in self._peers.items() if peer.doubted(now)} - foreign - differing
+        doubled = {peer.pair.peer for peer in self._everybody() if peer.doubted(now)} - foreign - differing
         early = _recent(self._early, now)
         return RefusedSenders(*(tuple(sorted(found)) for found in (doubled, foreign, differing, early)))
 

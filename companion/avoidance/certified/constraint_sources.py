@@ -77,6 +77,8 @@ class ConstraintSources:
         # it sends. Once it is silent it counts as landed at its last position, as it may be switched off.
         taken_over = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
         members = agreements.members.union(left.keys() - taken_over) - agreements.away
+        if distant := agreements.distant:
+            members |= self._beyond_range(distant, world)
         seen = self._noncooperative.seen(begins, members, world)
         strangers = self._noncooperative.balls(seen, own)
         noncooperative = [*strangers, *self._noncooperative.target(now, begins, view)]
@@ -117,6 +119,17 @@ class ConstraintSources:
             self._from_surfaces,
         )
         return others, self._noncooperative.field(seen, own, sensed)
+
+    def _beyond_range(self, distant: dict[int, int], world: World) -> set[int]:
+        """Return those of the ``distant`` vehicles that constrain no plan.
+
+        They are all but those whose position was received more than ``contact_us`` after their last plan or
+        statement: such a vehicle may have come without a companion that plans.
+        """
+        contact = self._config.certified.contact_us
+        received = world.neighbours.last_received()
+        unplanned = {s for s, time, _, _ in received if s in distant and time > distant[s] + contact}
+        return distant.keys() - unplanned
 
     def _fixed_constraints(self, own: Array) -> list[tuple[Array, float]]:
         """Return the fixed obstacles near the plan: spheres at their centres, posts at the plan's height.

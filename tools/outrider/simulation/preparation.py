@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib import import_module
+from math import ceil
 from typing import NamedTuple
 
+from companion.avoidance.certified.margins import fastest, margin
 from companion.avoidance.certified.plan_sides import plan_sides
 from companion.errors import CompanionError
 from mavlink_bridge.frames import FleetFrame
@@ -81,10 +83,20 @@ def _against_range(scenario: Scenario) -> Iterator[str]:
             f"companion.certified.range is {certified.range:g}, but airborne is false: columns are not "
             "agreed with who is not heard; allowed: null, or airborne: true"
         )
+    settings = settings_of(scenario)
     try:
-        plan_sides(settings_of(scenario))
+        plan_sides(settings)
     except CompanionError as error:
         yield f"companion.{error}"
+    radio, limits = scenario.links.swarm.range, settings.limits
+    parted = 2e-6 * fastest(limits) * certified.epoch_us
+    least = certified.range + 2.0 * margin(settings.certified, settings.field, limits) + parted
+    if radio is not None and radio <= least:
+        yield (
+            f"links.swarm.range is {radio:g} m, so that a vehicle that leaves companion.certified.range = "
+            f"{certified.range:g} m is not heard to leave; allowed with this margin, v_max and epoch_us: "
+            f"more than {ceil(1e3 * least) / 1e3:.3f} m, or null"
+        )
 
 
 def _not_for_points(scenario: Scenario) -> Iterator[str]:
