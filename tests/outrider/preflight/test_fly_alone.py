@@ -98,7 +98,8 @@ def test_without_a_go_nothing_arms_and_a_go_counts_in_turn() -> None:
     assert (one.turns.asks, three.turns.asks) == (True, False)
     assert three.order(0, "go") == "go: not now: waiting for the flight of vehicle 1"
     assert one.order(0, "go") == ""
-    seen = run(waiting, 60.0)
+    # Two seconds more than with streams from the start: an ArduCopter streams nothing unasked.
+    seen = run(waiting, 70.0)
     assert seen.order == [1]
     # The first has landed, and the go of the other one was not stored.
     assert (one.phase, three.turns.asks) == (Phase.TURNS, True)
