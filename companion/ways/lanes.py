@@ -10,31 +10,17 @@ may expect other steps; that costs time, and no distance: sub-goals change only 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
-from companion.values.horizon import Array
 from companion.ways.clearance import Clearance
 from companion.ways.giving_way import Lengths, step
 from companion.ways.lattice import Lattice
 from companion.ways.subgoal import Subgoal
+from companion.ways.traveller import Traveller
 
 _STEPS = 8
 """Number of steps that are looked ahead."""
-
-
-class Traveller(NamedTuple):
-    """Vehicle whose newest plan ends at ``rest`` (3,), and that wants to go to ``goal`` (3,), m.
-
-    A goal that is not known is where the plan ends. ``reached``: it has been at this goal, and only makes
-    room for those that have not. If it had priority again beside its goal, it would push back the one that it
-    has made room for.
-    """
-
-    rest: Array
-    goal: Array
-    reached: bool = False
 
 
 class Lanes:

@@ -27,8 +27,8 @@ from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
 from companion.ways import way_of
-from companion.ways.lanes import Traveller
 from companion.ways.subgoal import Subgoal
+from companion.ways.traveller import Traveller
 from companion.world import View, World
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame

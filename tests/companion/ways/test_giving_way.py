@@ -10,8 +10,9 @@ from companion.config.planning import LimitsConfig
 from companion.ways.clearance import Clearance
 from companion.ways.giving_way import step
 from companion.ways.grid import grid
-from companion.ways.lanes import Lanes, Traveller
+from companion.ways.lanes import Lanes
 from companion.ways.lattice import Lattice
+from companion.ways.traveller import Traveller
 from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
 
