@@ -27,9 +27,19 @@ Place = tuple[float, float, float]
 
 
 def state(proxy: MavProxy, kind: str = "LOCAL_POSITION_NED") -> State:
-    """The fields of the newest message of a kind that MAVProxy has."""
-    shown = proxy.ask(f"status {kind}", rf"{kind} \{{(.*)\}}").group(1)
-    return {name: float(value) for name, value in _FIELD.findall(shown)}
+    """The fields of the newest message of a kind that MAVProxy has.
+
+    Before it has requested streams, some 15 s after its start, it has none and shows nothing.
+    """
+    until = time.monotonic() + PATIENCE
+    while True:
+        try:
+            shown = proxy.ask(f"status {kind}", rf"{kind} \{{(.*)\}}", 2.0).group(1)
+        except AssertionError:
+            if time.monotonic() > until:
+                raise
+            continue
+        return {name: float(value) for name, value in _FIELD.findall(shown)}
 
 
 def when(proxy: MavProxy, is_it: Callable[[State], bool], kind: str = "LOCAL_POSITION_NED") -> State:
