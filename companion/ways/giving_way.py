@@ -43,8 +43,6 @@ def step(
             nexts[one], taken[place] = place, one
             if other is not None and other != one and other not in nexts and not moves(other, one):
                 # It stays where it is.
-                if taken.get(place) == one:
-                    del taken[place]
                 taken[place] = other
                 del nexts[one]
                 continue

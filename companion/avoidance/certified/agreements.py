@@ -79,7 +79,7 @@ class Agreements:
         settings (frame, dt, steps, epoch), is too far from ``now``, or differs from the stored plan of its
         epoch.
         """
-        peer = self._peers.get(system) or self._distant.get(system)
+        peer = self._heard(system)
         if peer is not None and peer.last_payload == payload:
             # Most payloads repeat the last one.
             peer.last_received = now
@@ -160,20 +160,23 @@ class Agreements:
         """
         self.refused += 1
         self._differing[system] = now
-        held = self._distant if system in self._distant else self._peers
-        peer = held.get(system)
+        peer = self._heard(system)
         if peer is None:
             return
         if peer.stated:
             peer.contradict(now)
         elif system not in self._config.fleet:
-            del held[system]
+            self._peers.pop(system, None)
+            self._distant.pop(system, None)
             self._members = None
 
     def _unknown_differs(self, now: int, system: int) -> bool:
         """Return whether ``system`` is no peer, and has lately sent a statement of another fleet."""
-        known = system in self._peers or system in self._distant
-        return not known and system in _recent(self._differing, now)
+        return self._heard(system) is None and system in _recent(self._differing, now)
+
+    def _heard(self, system: int) -> Peer | None:
+        """Return the peer ``system``, or the one that was heard beyond the range; None for another one."""
+        return self._peers.get(system) or self._distant.get(system)
 
     def _everybody(self) -> Iterator[Peer]:
         """Yield the peers, and those that were heard beyond the range."""
@@ -181,14 +184,13 @@ class Agreements:
         yield from self._distant.values()
 
     def _known(self, system: int) -> Peer:
-        if system in self._distant:
-            return self._distant[system]
-        if system not in self._peers:
-            self._peers[system] = Peer(self.own, system, parts=self._beyond is not None)
+        peer = self._heard(system)
+        if peer is None:
+            peer = self._peers[system] = Peer(self.own, system, parts=self._beyond is not None)
             self._members = None
             if self._beyond is not None:
-                self._peers[system].meet()
-        return self._peers[system]
+                peer.meet()
+        return peer
 
     def begin(self, since: int) -> None:
         """Discard all agreements: the own plan of ``since`` (µs) does not begin on the one before."""
@@ -288,19 +290,21 @@ class Agreements:
 
     def newest(self) -> list[StoredPlan]:
         """Return the newest plan of each peer that has not said farewell, by system id."""
-        found = [peer.plans.newest for _, peer in sorted(self._peers.items()) if peer.left is None]
-        return [plan for plan in found if plan is not None]
+        return [plan for _, plan in sorted(self._newest().items())]
+
+    def _newest(self) -> dict[int, StoredPlan]:
+        """Return the newest plan of each peer that has not said farewell, in the order of the peers."""
+        known = ((s, peer.plans.newest) for s, peer in self._peers.items() if peer.left is None)
+        return {system: plan for system, plan in known if plan is not None}
 
     def ends(self) -> dict[int, Array]:
         """Return where the newest plan of each peer that has not said farewell ends (3,), m, by system id."""
-        known = ((s, peer.plans.newest) for s, peer in self._peers.items() if peer.left is None)
-        return {system: plan.controls[-1, 2] for system, plan in known if plan is not None}
+        return {system: plan.controls[-1, 2] for system, plan in self._newest().items()}
 
     @property
     def columns(self) -> frozenset[int]:
         """Systems whose newest plan is a column, without those that said farewell: they make no other."""
-        newest = ((s, peer.plans.newest) for s, peer in self._peers.items() if peer.left is None)
-        return frozenset(system for system, plan in newest if plan is not None and plan.plan.column)
+        return frozenset(system for system, plan in self._newest().items() if plan.plan.column)
 
     @property
     def outside(self) -> float:

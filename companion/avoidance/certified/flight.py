@@ -16,6 +16,7 @@ from companion.avoidance.certified.constraint_sources import BESIDE_M, Constrain
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.detour import Detour
 from companion.avoidance.certified.fingerprint import identity
+from companion.avoidance.certified.lane_goals import LaneGoals
 from companion.avoidance.certified.margins import beside, from_surfaces, further
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.peer_plans import StoredPlan
@@ -28,7 +29,6 @@ from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
 from companion.ways import way_of
 from companion.ways.subgoal import Subgoal
-from companion.ways.traveller import Traveller
 from companion.world import View, World
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame
@@ -38,16 +38,11 @@ from mavlink_bridge.wire.agreements import Statement, in_messages
 from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.goal import PAYLOAD_TYPE as GOAL
-from mavlink_bridge.wire.goal import WireGoal, goal_at
-from mavlink_bridge.wire.goal import pack as pack_goal
-from mavlink_bridge.wire.goal import unpack as unpack_goal
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack
 
 _TURNING_SENSES = {"left": -1.0}
 _EFFORT = 2
 """How much of a search is done for a plan."""
-_REACHED_M = 0.2
-"""Distance of the end of the plan from a goal that counts as reached, and by which a goal may move."""
 
 
 class CertifiedFlight:
@@ -103,10 +98,8 @@ class CertifiedFlight:
         self.left_tube = 0
         """Number of times that the vehicle left the tube."""
         self._outside = 0.0
-        self._origin = fleet.fingerprint
-        self._told: dict[int, WireGoal] = {}
-        self._reached = False
-        self._goal: Array | None = None
+        in_lanes = config.way is not None and config.way.lanes is not None
+        self._lane_goals = LaneGoals(own, fleet.fingerprint, self._way, in_use=in_lanes)
         self._in_lane = False
         self._in_control = self._announced = self._received = self._participated = False
         self._turn = 0
@@ -125,7 +118,10 @@ class CertifiedFlight:
         if message.payload_type == PAYLOAD_TYPE:
             self.agreements.receive_plan(now, system, message.payload)
         elif message.payload_type == GOAL:
-            self._hear_goal(system, message.payload)
+            try:
+                self._lane_goals.receive(system, message.payload)
+            except PlanWireError:
+                self.agreements.refused += 1
             return
         elif message.payload_type == AGREEMENTS:
             try:
@@ -135,16 +131,6 @@ class CertifiedFlight:
         else:
             return
         self._received = True
-
-    def _hear_goal(self, system: int, payload: bytes) -> None:
-        """Keep the goal that ``system`` tells, unless it cannot be decoded or is in another frame."""
-        try:
-            goal = unpack_goal(payload)
-        except PlanWireError:
-            self.agreements.refused += 1
-            return
-        if goal.origin == self._origin:
-            self._told[system] = goal
 
     def stand(self, now: int, position: Array) -> None:
         """While not in control, continue the committed plan, or hold ``position`` (3,), m.
@@ -368,7 +354,7 @@ class CertifiedFlight:
         way, detour = self._way, self._detour
         begun = detour.begun, 0 if way is None else way.begun
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
-        in_lane = self._lane(rest, destination)
+        in_lane = self._lane_goals.subgoal(rest, destination, self.agreements.ends)
         if self._in_lane != (in_lane is not None):
             self._in_lane = in_lane is not None
             self._deadlock_turn.restart()
@@ -384,24 +370,6 @@ class CertifiedFlight:
         if (detour.begun, 0 if way is None else way.begun) != begun:
             self._deadlock_turn.restart()
         return subgoal._replace(beyond=subgoal.beyond + goal.beyond)
-
-    def _lane(self, rest: Array, destination: Array) -> Subgoal | None:
-        """Return where to aim for among vehicles that cannot pass; None where none is met."""
-        if self._goal is None or float(np.abs(self._goal - destination).max()) > _REACHED_M:
-            self._reached = False
-        self._goal = destination
-        self._reached |= float(np.abs(rest - destination).max()) < _REACHED_M
-        lanes = None if self._way is None else self._way.lanes()
-        if lanes is None:
-            return None
-        ends = self.agreements.ends()
-        travellers = {}
-        for system, end in ends.items():
-            told = self._told.get(system)
-            goal, reached = (end, True) if told is None else (told.position_m, told.reached)
-            travellers[system] = Traveller(end, goal, reached)
-        travellers[self._own.system] = Traveller(rest, destination, self._reached)
-        return lanes.subgoal(self._own.system, travellers)
 
     def _anticipated(self, epoch: int, own: Array, goal: Array) -> float:
         """Return the turn (rad) of ``goal`` (3,), m, for encounters with the peers' newest plans.
@@ -477,16 +445,7 @@ class CertifiedFlight:
         statements = self._statements(announced.epoch, every=True, farewell=farewell)
         plans = [announced, *self._repeated()]
         tunnels = [Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan)) for plan in plans]
-        return [*sync, *tunnels, *statements, *self._tell_goal()]
-
-    def _tell_goal(self) -> list[Message]:
-        """Return the message of the own goal, where vehicles give way to each other in lanes."""
-        way = self._config.way
-        if way is None or way.lanes is None or self._goal is None:
-            return []
-        return [
-            Tunnel(self._own, 0, 0, GOAL, pack_goal(goal_at(self._goal, self._origin, reached=self._reached)))
-        ]
+        return [*sync, *tunnels, *statements, *self._lane_goals.messages()]
 
     def _away(self, now: int) -> list[Message]:
         """Return the statement that another controller flies the vehicle, if plans were announced before."""

@@ -37,6 +37,14 @@ NORTH, UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 INSIDE, BEHIND = np.array([0.0, 0.5, 5.0]), np.array([8.0, -0.5, 5.0])
 WALL = row((0.0, -9.9), (0.0, 4.0))
 """With a box of 10 m it leaves an opening in the north."""
+CORRIDOR = [
+    Box(kind="box", at=(0.5 * x, -0.5 * y, 1.25), size=(0.5, 0.5, 2.5))
+    for y, cells in enumerate(["#######", "......#", "#####.#", "#.....#", "#.#####", "#......", "#######"])
+    for x, cell in enumerate(cells)
+    if cell == "#"
+]
+CORRIDOR_BOX = LimitsConfig(box_min=(-1.0, -3.3, 0.5), box_max=(4.0, 0.3, 2.5))
+"""A corridor of half a metre that turns six times within three metres."""
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -254,33 +262,17 @@ def test_among_thousands_of_boxes_each_cell_is_compared_with_those_near_it() -> 
 
 def test_a_point_passes_bends_that_are_nearer_to_each_other_than_places_where_it_looks() -> None:
     """A corridor of half a metre that turns six times within three metres."""
-    closed = ["#######", "......#", "#####.#", "#.....#", "#.#####", "#......", "#######"]
-    boxes = [
-        Box(kind="box", at=(0.5 * x, -0.5 * y, 1.25), size=(0.5, 0.5, 2.5))
-        for y, cells in enumerate(closed)
-        for x, cell in enumerate(cells)
-        if cell == "#"
-    ]
-    limits = LimitsConfig(box_min=(-1.0, -3.3, 0.5), box_max=(4.0, 0.3, 2.5))
-    leads = Way(WayConfig(clearance=0.0, cell=0.1), boxes, limits, 0.2, 10, planar=True)
+    leads = Way(WayConfig(clearance=0.0, cell=0.1), CORRIDOR, CORRIDOR_BOX, 0.2, 10, planar=True)
     start, goal = np.array([-0.6, -0.5, 1.0]), np.array([3.6, -2.5, 1.0])
     places = flown(leads, start, goal, by=0.05)
     assert np.abs(places[-1] - goal).max() < 1e-6
     assert leads.begun == 1
-    assert least(boxes, places) >= 0.15
+    assert least(CORRIDOR, places) >= 0.15
 
 
 def test_from_every_place_beside_the_walls_of_a_corridor_a_way_leads() -> None:
     """A corridor of half a metre with a bend; ways keep 0.2 m, a vehicle may be anywhere in it."""
-    closed = ["#######", "......#", "#####.#", "#.....#", "#.#####", "#......", "#######"]
-    boxes = [
-        Box(kind="box", at=(0.5 * x, -0.5 * y, 1.25), size=(0.5, 0.5, 2.5))
-        for y, cells in enumerate(closed)
-        for x, cell in enumerate(cells)
-        if cell == "#"
-    ]
-    limits = LimitsConfig(box_min=(-1.0, -3.3, 0.5), box_max=(4.0, 0.3, 2.5))
-    clear = Clearance(boxes, grid(limits, 0.1, 150_000, 1.0), 0.5)
+    clear = Clearance(CORRIDOR, grid(CORRIDOR_BOX, 0.1, 150_000, 1.0), 0.5)
     goal = np.array([3.6, -2.5, 1.0])
     middles = np.array([[2.5, -0.5, 1.0], [2.5, -1.0, 1.0], [0.5, -1.5, 1.0], [0.5, -2.5, 1.0]])
     for middle in middles:
@@ -289,7 +281,7 @@ def test_from_every_place_beside_the_walls_of_a_corridor_a_way_leads() -> None:
                 place = middle + off * np.array([1 - corner // 2 * 2, 1 - corner % 2 * 2, 0.0])
                 found = result(finding(clear, (0.2,), place, goal))
                 assert found is not None, place
-                assert least(boxes, found.corners) >= 0.9 * min(0.2, 0.25 - off)
+                assert least(CORRIDOR, found.corners) >= 0.9 * min(0.2, 0.25 - off)
 
 
 def test_after_the_destination_has_jumped_nothing_leads_to_the_old_one() -> None:
