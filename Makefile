@@ -13,10 +13,10 @@ fly: .venv/.made  ## the escort of a recorded real flight; more with ARGS="--met
 	@$(BIN)/outrider swarm escort $(ARGS)
 
 test: .venv/.made  ## all tests but the slow ones; one test with ARGS="-k name"
-	@$(BIN)/pytest -m "not slow" -n $(JOBS) --dist loadfile $(ARGS) </dev/null
+	@$(BIN)/pytest -m "not slow" -n $(JOBS) --dist loadfile --max-worker-restart 0 $(ARGS) </dev/null
 
 slow: .venv/.made .venv/clients/.made  ## the slow tests: flights, browsers, other people's clients, wheels
-	@$(BIN)/pytest -m slow -n $(JOBS) --dist loadfile $(ARGS) </dev/null
+	@$(BIN)/pytest -m slow -n $(JOBS) --dist loadfile --max-worker-restart 0 $(ARGS) </dev/null
 
 trial: .venv/.made  ## five companions on five vehicles through all that may happen; ARGS="--story sortie --flavour px4", docs/real-firmware.md
 	@$(BIN)/python -m trials $(ARGS)

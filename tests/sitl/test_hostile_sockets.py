@@ -25,7 +25,7 @@ from mavlink_bridge.links.tcp import BACKLOG, TcpListener
 from mavlink_bridge.links.udp import MOST_PEERS, UdpListener
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.realtime import RealTime
-from mavlink_bridge.messages import CommandAck, LocalPosition, Source
+from mavlink_bridge.messages import CommandAck, CommandLong, LocalPosition, Source
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 from tests.sitl.autopilot_rig import LINK, Rig
@@ -51,6 +51,8 @@ class Pilot:
         self._codec = Codec(lambda message_id, _system, _component: message_id in (32, 77), signing)
         self.positions: list[LocalPosition] = []
         self.answers = 0
+        # ArduPilot streams nothing unasked on a new link.
+        self._say(command(511, 32, 100_000, source=ME))
 
     def ask(self) -> None:
         """Ask, and wait for an answer; after a while ask again, as any client does."""
@@ -60,13 +62,20 @@ class Pilot:
             assert now - began < PATIENCE, "no answer came"
             if now - asked >= AGAIN:
                 asked = now
-                self._say()
+                self._say(command(520, source=ME))
             self.listen()
 
-    def _say(self) -> None:
+    def hear(self, count: int) -> None:
+        """Listen until ``count`` positions have come."""
+        began = time.monotonic()
+        while len(self.positions) < count:
+            assert time.monotonic() - began < PATIENCE, "no position came"
+            self.listen()
+
+    def _say(self, message: CommandLong) -> None:
         if self._signing is not None:
             self._signing.present(time.time_ns() // 1000)
-        self._socket.sendall(self._codec.encode(command(520, source=ME)))
+        self._socket.sendall(self._codec.encode(message))
 
     def listen(self) -> None:
         """To what comes next."""
@@ -134,8 +143,7 @@ def test_a_pilot_is_served_whatever_others_do(key: Key | None) -> None:
     udp, tcp = UdpListener(UdpIn(HOST, 0), clock), TcpListener(TcpIn(HOST, 0), clock)
     with flying(rig, udp, tcp) as loop:
         pilot = Pilot(tcp.address[1], mine)
-        while not pilot.positions:
-            pilot.listen()
+        pilot.hear(1)
         before = len(pilot.positions)
         with flooded(udp, tcp):
             for _ in range(25):
@@ -143,8 +151,7 @@ def test_a_pilot_is_served_whatever_others_do(key: Key | None) -> None:
             used = blocks()
             for _ in range(50):
                 pilot.ask()
-            while len(pilot.positions) < before + 12:
-                pilot.listen()
+            pilot.hear(before + 12)
             grown = blocks() - used
             waiting = [len(stream._waiting) for stream in tcp._streams]
             assert len(udp._peers) <= MOST_PEERS
