@@ -88,7 +88,7 @@ class ConstraintSources:
         unshared: list[tuple[Array, Array | float]] = [
             *(self._final_constraint(own, last, begins) for last in lasts),
             *self._fixed_constraints(own),
-            *(self._landed_constraint(own, last.controls[-1, 2], self._from_last(last)) for last in lasts),
+            *(self._landed_constraint(own, last.controls[-1, 2], self.from_last(last)) for last in lasts),
             *(self._landed_constraint(own, place, self.between) for place in beside_plans),
             *noncooperative,
             *(self._sensed_constraints(sensed) if sensed.ids else ()),
@@ -194,7 +194,7 @@ class ConstraintSources:
                 found[system] = off, position, now - time <= self._silent_us
         return found
 
-    def _from_last(self, last: StoredPlan) -> float:
+    def from_last(self, last: StoredPlan) -> float:
         """Return the least distance (m) from the ``last`` plan of a vehicle that said farewell."""
         return self.between + last.plan.column * self._further
 
@@ -202,7 +202,7 @@ class ConstraintSources:
         """Return the constraint of the ``last`` plan of a vehicle that said farewell, while it is flown."""
         plan = last.later(begins, self._steps)
         centres = levelled(plan, own) if last.plan.column else plan
-        return centres, self._from_last(last)
+        return centres, self.from_last(last)
 
     def _landed_constraint(self, own: Array, place: Array, least: float) -> tuple[Array, float]:
         """Return the constraint at the ``place`` (3,), m, of a vehicle that lands or has landed.
@@ -224,7 +224,7 @@ class ConstraintSources:
             above = 0.0 if isinstance(one, Post) else max(one.at[2] - high, low - one.at[2], 0.0)
             fixed.append((one.at[:2], self._from_surfaces + one.radius, above))
         landed = [
-            (tuple(last.controls[-1, 2, :2]), self._from_last(last), 0.0) for last in agreements.left.values()
+            (tuple(last.controls[-1, 2, :2]), self.from_last(last), 0.0) for last in agreements.left.values()
         ]
         vehicles = []
         for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():

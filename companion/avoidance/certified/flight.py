@@ -20,6 +20,7 @@ from companion.avoidance.certified.lane_goals import LaneGoals
 from companion.avoidance.certified.margins import beside, from_surfaces, further
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.peer_plans import StoredPlan
+from companion.avoidance.certified.places import Places
 from companion.avoidance.certified.plan_sides import plan_sides
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.reservation import Reservation
@@ -68,6 +69,7 @@ class CertifiedFlight:
         self._listens_since: int | None = None
         self._last_step = 0
         self._sources = ConstraintSources(config, steps)
+        self._places = Places(config, own.system, self._sources)
         self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
         least = from_surfaces(certified, config.field, config.limits) + BESIDE_M
@@ -337,7 +339,8 @@ class CertifiedFlight:
         own = commitment.own()
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
-        subgoal = self._subgoal(now, epoch, own[-1, 2], aim.destination)
+        destination = self._places.destination(epoch, own[-1, 2], aim, self.agreements)
+        subgoal = self._subgoal(now, epoch, own[-1, 2], destination)
         anticipates = self._config.certified.anticipation.most > 0.0 and aim.path is None
         turn = self._anticipated(epoch, own, subgoal.place) if anticipates else 0.0
         goal = subgoal.place

@@ -107,13 +107,32 @@ def test_others_converge_without_those_whose_companion_ends_for_good() -> None:
     assert run.conductor.others_converged_at is None
 
 
-def test_a_goal_where_a_vehicle_rests_whose_companion_has_ended_is_counted_and_not_waited_for() -> None:
+def _of_three() -> tuple[Scenario, float]:
+    """Three vehicles of which the companion of the second ends after 1 s, and the least distance of plans."""
     faults = [{"kind": "vanish", "vehicle": 12, "at_s": 1.0}]
     certified = {"avoidance": "certified"}
     changes = {"vehicles": 3, "airborne": True, "cap_s": 10.0, "faults": faults, "companion": certified}
     of = scenario("antipodal-8", **changes, sensors="rtk")
     config = settings_of(of)
     least = between(config.certified, config.field, config.limits)
+    return of, least
+
+
+def _silent_beside_a_goal(off: float) -> tuple[Run, Any, Any, float]:
+    """The run of three after 1 s, their goals, where the silent one rests, and the least distance of plans.
+
+    It rests ``off`` m east of the goal of the third, and 1 m higher.
+    """
+    of, least = _of_three()
+    run = Run(of)
+    goals = run.starts.goals
+    assert goals is not None
+    run.show(1.0, run.starts.positions)
+    return run, goals, goals[2] + [off, 0.0, 1.0], least
+
+
+def test_a_goal_where_a_vehicle_rests_whose_companion_has_ended_is_counted_and_not_waited_for() -> None:
+    of, least = _of_three()
     for off, covered in ((least - 0.31, 1), (least - 0.29, 0)):
         run = Run(of)
         starts, goals = run.starts.positions, run.starts.goals
@@ -121,14 +140,35 @@ def test_a_goal_where_a_vehicle_rests_whose_companion_has_ended_is_counted_and_n
         run.show(1.0, starts)
         # The third vehicle cannot get nearer than 0.3 m to its goal, in the first case.
         places = np.array([goals[0], goals[2] + [off, 0.0, 0.0], goals[2] + [off, least, 0.0]])
-        run.show(0.4, places)
+        run.show(1.4, places)
         assert run.conductor.covered == 0
         assert run.show(20.0, places)
         assert run.conductor.covered == covered
         assert run.conductor.others_converged_at is None
         start = run.conductor.clock_start
         assert start is not None
-        assert run.conductor.able_converged_at == (start + 1_000_000 if covered else None)
+        # It has rested for a second since the end of its companion.
+        assert run.conductor.able_converged_at == (start + 2_000_000 if covered else None)
+
+
+def test_a_vehicle_whose_goal_is_covered_has_arrived_where_it_rests_as_near_to_it_as_it_can() -> None:
+    for further, arrived in ((0.2, True), (0.4, False)):
+        run, goals, silent, least = _silent_beside_a_goal(0.4)
+        # Heights do not count: nobody flies over the silent vehicle, nor under it.
+        third = goals[2] - [least - 0.4 + further, 0.0, 0.0]
+        run.show(20.0, [goals[0], silent, third])
+        assert run.conductor.covered == 1
+        assert (run.conductor.others_converged_at is not None) == arrived
+        assert run.conductor.converged_at is None
+
+
+def test_a_gust_does_not_uncover_a_goal() -> None:
+    run, goals, silent, _ = _silent_beside_a_goal(0.4)
+    run.show(3.0, [goals[0], silent, run.starts.positions[2]])
+    assert run.conductor.covered == 1
+    pushed = silent + np.array([3.0, 0.0, 0.0])
+    run.show(1.0, [goals[0], pushed, run.starts.positions[2]])
+    assert run.conductor.covered == 1
 
 
 def test_a_companion_that_restarts_is_given_the_go_and_the_goal_again() -> None:

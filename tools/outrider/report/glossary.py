@@ -25,7 +25,9 @@ TERMS = {
     "converged": Term("converged", "", "all vehicles in place, and slow, for one second"),
     "convergence_time_s": Term("time to converge", "s", "start of that second, after the goal event"),
     "others_converge_s": Term(
-        "others converge", "s", "the same without the vehicles whose companion ends for good"
+        "others converge",
+        "s",
+        "the same without the vehicles whose companion ends for good, or beside a goal that is covered",
     ),
     "covered_goals": Term(
         "covered goals", "", "of the others, nearer than the least distance to where such a vehicle rests"

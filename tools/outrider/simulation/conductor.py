@@ -161,7 +161,10 @@ class Conductor:
 
     @property
     def others_converged_at(self) -> int | None:
-        """Time (µs) from which on all vehicles have arrived whose companion does not end for good."""
+        """Time (µs) from which on all vehicles have arrived whose companion does not end for good.
+
+        One whose goal is covered has arrived where it rests as near to it as it can (``CoveredGoals``).
+        """
         return self._others.at
 
     @property
@@ -251,15 +254,15 @@ class Conductor:
             self._order_again(self._successors.popleft().system)
         if self._scenario.has_goal and since >= self._last_jump:
             speeds = np.linalg.norm(sight.velocities[: self._scenario.vehicles], axis=1)
-            arrived = (self.errors(sight) < self.near) & (speeds < SLOW)
-            lasting, covered = (
-                self._goals.lasting,
-                self._goals.covered(since, sight.positions, sight.velocities),
-            )
-            self.covered = int(covered.sum())
+            errors, still = self.errors(sight), speeds < SLOW
+            arrived = (errors < self.near) & still
+            goals = self._goals
+            goals.see(since, sight.positions, sight.velocities)
+            self.covered = int(goals.covered.sum())
             self._all.see(now, arrived=bool(arrived.all()))
-            self._others.see(now, arrived=bool(lasting.any() and arrived[lasting].all()))
-            able = lasting & ~covered
+            rest = (errors < goals.away + self.near) & still
+            self._others.see(now, arrived=bool(goals.lasting.any() and rest[goals.lasting].all()))
+            able = goals.lasting & ~goals.covered
             self._able.see(now, arrived=bool(able.any() and arrived[able].all()))
         over = since >= self._scenario.duration_s * 1e6
         if self.converged_at is not None:

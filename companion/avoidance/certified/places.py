@@ -1,0 +1,78 @@
+"""Where a plan should end, in view of the places that others have: a free one on a surface or by a goal."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.constraint_sources import BESIDE_M, ConstraintSources
+from companion.avoidance.certified.free_place import covered, free_place
+from companion.avoidance.certified.surface_places import Comer, Taken, place_of
+from companion.avoidance.field.planner import Aim
+from companion.config import CompanionConfig
+from companion.config.formation import Nearest
+from companion.errors import SurfaceError
+from companion.surfaces import Surface
+from companion.values.horizon import Array
+
+_ON_SURFACE_M = 0.01
+"""Distance of a destination from the surface up to which it is on it, and not moved off it by a limit."""
+
+
+class Places:
+    """Places of the vehicle ``own`` (system id), beside what its constraint ``sources`` say."""
+
+    def __init__(self, config: CompanionConfig, own: int, sources: ConstraintSources) -> None:
+        self._config, self._own, self._sources = config, own, sources
+        # Another formation has places of its own.
+        self._assigns = isinstance(config.formation, Nearest)
+        limits = config.limits.within(config.field.margin(1))
+        self._low, self._high = np.array(limits.box_min[:2]), np.array(limits.box_max[:2])
+        self._height = 1.0 / config.field.downwash
+
+    def destination(self, epoch: int, rest: Array, aim: Aim, agreements: Agreements) -> Array:
+        """Return where the plan of the epoch after ``epoch`` (µs) should end, (3,), m.
+
+        ``rest`` (3,), m: where the committed plan ends. ``aim``: with the destination without the others.
+        """
+        if aim.surface is None:
+            return self._beside_goal(epoch, rest, aim.destination, agreements)
+        return self._on_surface(rest, aim, aim.surface, agreements) if self._assigns else aim.destination
+
+    def _on_surface(self, rest: Array, aim: Aim, surface: Surface, agreements: Agreements) -> Array:
+        target, destination = aim.target_end, aim.destination
+        ends, left = agreements.ends(), agreements.left
+        if not ends and not left:
+            return destination
+        reach = self._sources.between + BESIDE_M
+        taken = [
+            Taken(last.controls[-1, 2] - target, self._sources.from_last(last) + BESIDE_M, 0.0)
+            for last in left.values()
+        ]
+        comers = [Comer(self._own, rest - target, surface)]
+        surface_of = self._config.surface_of
+        comers += [Comer(system, end - target, surface_of(system)) for system, end in ends.items()]
+        try:
+            wanted = surface.nearest(destination - target)
+            off = destination - target - wanted
+            if off @ off > _ON_SURFACE_M**2:
+                return destination
+            place = place_of(self._own, comers, taken, reach, wanted, self._height)
+        except SurfaceError:
+            return destination
+        return destination if place is wanted else target + place
+
+    def _beside_goal(self, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
+        """Return ``goal`` (3,), m, or the nearest free place if a vehicle that said farewell covers it."""
+        left = agreements.left
+        if not left:
+            return goal
+        ends = np.array([last.controls[-1, 2, :2] for last in left.values()])
+        radii = np.array([self._sources.from_last(last) for last in left.values()])
+        if not covered(goal[:2], ends, radii):
+            return goal
+        for discs in self._sources.resting(epoch, rest, goal, agreements):
+            place = free_place(goal[:2], discs, self._low, self._high)
+            if place is not None:
+                return np.array([place[0], place[1], goal[2]])
+        return goal
