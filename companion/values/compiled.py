@@ -80,8 +80,6 @@ def kernel(result: Any, *arguments: Any) -> Callable[[_F], _F]:
                 found = compile_(stored=False)
         if found.stats.cache_hits:
             _free_intermediate_code(found)
-        else:
-            _report(found.stats.cache_path)
         return cast(_F, found)
 
     return compiled
@@ -98,27 +96,6 @@ def _free_intermediate_code(loaded: Any) -> None:
         if module is not None:
             module.close()
             result.library._shared_module = None
-
-
-_receivers: list[Callable[[str], None]] = []
-
-
-def report_compilation(to: Callable[[str], None]) -> None:
-    """Call ``to`` with a text, once, if a kernel is compiled because it was not stored.
-
-    This must be called before the modules with kernels are imported.
-    """
-    _receivers.append(to)
-
-
-def _report(stored_in: str | None) -> None:
-    where = (
-        "no directory can be written, so every start compiles: set NUMBA_CACHE_DIR to one that can"
-        if stored_in is None
-        else "later starts load the result"
-    )
-    while _receivers:
-        _receivers.pop()(f"compiling the planner: 40 s on a PC, longer on a small computer; {where}")
 
 
 def part(function: _F) -> _F:

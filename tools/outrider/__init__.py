@@ -91,6 +91,10 @@ def __getattr__(name: str) -> Any:
         value = import_module("outrider.sim")
     elif name in _PLACES:
         module, _, attribute = _PLACES[name].partition(":")
+        if module != "outrider.errors":
+            from outrider.terminal.compilation import log_if_compiling
+
+            log_if_compiling()
         value = getattr(import_module(module), attribute)
     else:
         raise AttributeError(f"module 'outrider' has no attribute {name!r}")

@@ -11,12 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 from outrider.sim.batch import Batch
 from outrider.sim.vehicle import Vehicle, VehicleState
+from outrider.terminal.compilation import log_if_compiling
 from sitl.vehicle.config import VehicleConfig
 
 if TYPE_CHECKING:
     from outrider.sim.environment import EscortVectorEnv
 
 __all__ = ["Batch", "EscortVectorEnv", "Vehicle", "VehicleConfig", "VehicleState"]
+
+# The physics of a type of vehicle is compiled at its first step.
+log_if_compiling()
 
 
 def __getattr__(name: str) -> Any:
