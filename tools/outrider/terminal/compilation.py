@@ -12,7 +12,7 @@ from outrider.terminal.lines import say
 
 _TEXTS: Final = {
     "companion": "compiling the planner: 40 s on a PC, longer on a small computer",
-    "sitl": "compiling the physics of this type of vehicle: 30 s on a PC",
+    "sitl": "compiling the physics of this type of vehicle: 10 to 30 s on a PC",
 }
 """Text for the kernels of each package."""
 _STORED, _NOT_STORED = (
@@ -56,7 +56,8 @@ def report_compilation(to: Callable[[str], None]) -> None:
         _notices[0].to = to
         return
     _notices.append(Notices(to))
-    event.register("numba:compile", _notices[0])
+    register: Callable[[str, event.Listener], None] = event.register
+    register("numba:compile", _notices[0])
 
 
 def say_if_compiling() -> None:
