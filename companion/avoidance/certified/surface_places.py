@@ -11,6 +11,7 @@ that it has received. Two that have received other plans may take the same place
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, hypot
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ _EQUALLY_NEAR_M = 0.25
 _MIN_RADIUS_M = 0.1
 """Distance of a point from the vertical through the target below which it cannot be turned."""
 _ROUNDING_M = 1e-6
-_STEP, _MOST = 0.25, 32
+_STEP, _MOST = 0.35, 16
 """Step between places that are tried to each side where a surface is not round, in the largest distance that
 is kept, and how many there are at most.
 """
@@ -69,18 +70,37 @@ def place_of(
     already. ``reach``, ``height``: those of ``Taken`` for the comers' places. Where no place is free, it is
     ``nearest`` as well. Raises SurfaceError if the function of a user's surface fails.
     """
-    wanted = [(comer, comer.surface.nearest(comer.end)) for comer in comers]
-    wanted.sort(key=lambda one: (_distance(one[0].end, one[1]) // _EQUALLY_NEAR_M, one[0].system))
+    wanted = sorted(
+        zip(comers, _points(comers), strict=True),
+        key=lambda one: (_distance(one[0].end, one[1]) // _EQUALLY_NEAR_M, one[0].system),
+    )
+    before = next(row for row, (comer, _) in enumerate(wanted) if comer.system == own)
+    if not taken and _apart([nearest, *(point for _, point in wanted[:before])], reach, height):
+        return nearest
     found = list(taken)
-    for comer, point in wanted:
-        if comer.system == own:
-            break
+    for comer, point in wanted[:before]:
         place = _next_free(comer.surface, point, found)
         found.append(Taken(point if place is None else place, reach, height))
     if not found or _free(nearest[None], found)[0]:
         return nearest
+    comer, point = wanted[before]
     place = _next_free(comer.surface, point, found)
     return nearest if place is None else place
+
+
+def _points(comers: list[Comer]) -> Sequence[Array]:
+    """Return the point of its surface nearest to the end of each plan, (3,)."""
+    surface = comers[0].surface
+    if all(one.surface is surface for one in comers):
+        return list(surface.nearest(np.array([one.end for one in comers])))
+    return [one.surface.nearest(one.end) for one in comers]
+
+
+def _apart(points: list[Array], reach: float, height: float) -> bool:
+    """Return whether all ``points`` (3,) are ``reach`` (m) from each other."""
+    scaled = np.array(points) * (1.0, 1.0, height)
+    off = scaled[:, None] - scaled
+    return int((np.vecdot(off, off) < reach**2).sum()) == len(points)
 
 
 def _distance(one: Array, two: Array) -> float:
