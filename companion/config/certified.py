@@ -159,9 +159,9 @@ class CertifiedConfig(Settings):
     )
     range: Positive | None = Field(
         None,
-        description="m, true distance up to which two vehicles are certain to hear each other in"
-        " ``contact_us``; who is beyond needs no agreement, and all plans are so short that nobody is met"
-        " unheard; the same for the whole fleet, which begins and ends in the air; null: all agree with all",
+        description="m, true horizontal distance up to which two vehicles are certain to hear each other in"
+        " ``contact_us``, at whatever heights; who is beyond needs no agreement, and all plans are so short"
+        " that nobody is met unheard; the same for the whole fleet; null: all agree with all",
     )
     contact_us: int = Field(
         500_000,

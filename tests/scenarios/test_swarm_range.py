@@ -75,36 +75,57 @@ def test_only_one_process_has_all_places(tmp_path: Path) -> None:
         RealTimeFlight(OF, FIREFLY, 5, tmp_path, tmp_path)
 
 
-def certified(radio: float | None = None, **settings: object) -> Scenario:
-    limits = {"v_max": [1.5, 1.5, 0.5]}
-    companion = {"avoidance": "certified", "certified": settings, "limits": limits}
+def certified(
+    radio: float | None = None, *, planar: bool = False, airborne: bool = True, **settings: object
+) -> Scenario:
+    limits = {"v_max": [1.5, 1.5, 0.5], "box_min": [-20.0, -20.0, 3.0], "box_max": [20.0, 20.0, 10.0]}
+    companion = {"avoidance": "certified", "certified": settings, "limits": limits, "planar": planar}
     links = {"swarm": {"range": radio}}
-    return scenario("antipodal-8", {"airborne": True, "companion": companion, "links": links})
+    return scenario("antipodal-8", {"airborne": airborne, "companion": companion, "links": links})
 
 
 def test_certified_flights_that_no_range_allows_are_refused() -> None:
-    assert prepared(certified(range=15.0), "a file").scenario.companion.certified.range == 15.0
+    for airborne in (True, False):
+        found = prepared(certified(range=15.0, airborne=airborne), "a file").scenario
+        assert found.companion.certified.range == 15.0
     with pytest.raises(
         InputError, match=r"a file: companion\.certified\.range = 3 m leaves no room for plans"
     ):
         prepared(certified(range=3.0), "a file")
-    grounded = certified(range=15.0).model_copy(update={"airborne": False})
-    with pytest.raises(InputError, match=r"airborne is false: columns are not agreed"):
-        prepared(grounded, "a file")
 
 
-def test_radios_must_reach_so_far_that_who_leaves_is_heard_beyond_the_range() -> None:
+@pytest.mark.parametrize(
+    ("planar", "airborne", "heights"), [(True, True, 0.0), (True, False, 5.0), (False, True, 7.0)]
+)
+def test_radios_must_reach_so_far_that_who_leaves_is_heard_beyond_the_range(
+    planar: bool, airborne: bool, heights: float
+) -> None:
     """By two margins and what two vehicles part in an epoch; the error gives a value that is allowed."""
-    settings = {"range": 15.0, "tube": 0.5, "clock_us": 0, "sigmas": 0.0, "epoch_us": 200_000}
-    least = 15.0 + 2.0 * 0.5 + 2.0 * 0.2 * np.sqrt(1.5**2 + 1.5**2 + 0.5**2)
-    with pytest.raises(InputError, match=r"links\.swarm\.range is 15 m, so that .* more than") as error:
-        prepared(certified(15.0, **settings), "a file")
+    settings = {"range": 15.0, "tube": 0.5, "drift": 0.5, "clock_us": 0, "sigmas": 0.0, "epoch_us": 200_000}
+    leaves = 15.0 + 2.0 * 0.5 + 2.0 * 0.2 * np.sqrt(1.5**2 + 1.5**2 + 0.5**2)
+    least = np.hypot(leaves, heights)
+
+    def ready(radio: float) -> None:
+        prepared(certified(radio, planar=planar, airborne=airborne, **settings), "a file")
+
+    with pytest.raises(InputError, match=r"links\.swarm\.range is 15 m: too little .* more than") as error:
+        ready(15.0)
     named = re.search(r"more than ([\d.]+) m", str(error.value))
     assert named is not None
     assert 0.0 <= float(named[1]) - least < 0.001
-    prepared(certified(float(named[1]) + 0.001, **settings), "a file")
-    with pytest.raises(InputError, match="is not heard to leave"):
-        prepared(certified(least - 1e-6, **settings), "a file")
+    ready(float(named[1]) + 0.001)
+    with pytest.raises(InputError, match="or that leave it"):
+        ready(least - 1e-6)
+
+
+def test_radios_must_reach_a_vehicle_on_the_ground_within_the_range() -> None:
+    """Of those that fly in one plane nobody is above another, but they land."""
+    settings = {"range": 15.0, "tube": 0.05, "drift": 0.05, "clock_us": 0, "sigmas": 0.0, "epoch_us": 200_000}
+    high = certified(16.5, planar=True, **settings)
+    prepared(high.model_copy(update={"starts": high.starts.model_copy(update={"height": 4.0})}), "a file")
+    high = high.model_copy(update={"starts": high.starts.model_copy(update={"height": 9.0})})
+    with pytest.raises(InputError, match=r"more than 17\.493 m"):
+        prepared(high, "a file")
 
 
 def test_the_radios_of_the_comparison_reach_far_enough() -> None:

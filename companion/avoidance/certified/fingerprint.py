@@ -27,8 +27,8 @@ _RULES = 2
 _NANO, _MICRO = 1e9, 1e6
 """Units of angles (1e-9 °: 0.1 mm), and of lengths, speeds and k (1e-6 of the SI unit)."""
 _UTC, _OWN = 0, -1
-_RANGE = -2
-"""Mark before the numbers of a limited range, which are left out without one."""
+_RANGE = -3
+"""Mark before the numbers of a limited range, which are left out without one (−2: of one in space)."""
 
 
 class FleetIdentity(NamedTuple):

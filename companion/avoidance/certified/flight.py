@@ -225,7 +225,7 @@ class CertifiedFlight:
         turned = self._take_part(now)
         if turned:
             self.commitment.raise_column()
-        self.reservation.watch(now)
+        self.reservation.watch(now, listens=self._listens(now))
         return turned
 
     def due(self, now: int) -> bool:

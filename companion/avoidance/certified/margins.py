@@ -26,6 +26,14 @@ def margin(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) ->
     return _strays(config, limits) + config.sigmas * field.position_sigma
 
 
+def sideways(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
+    """Return by how much (m) a vehicle's true place may differ from its plan horizontally.
+
+    That holds also while its autopilot takes it off or lands it.
+    """
+    return margin(config, field, limits) + further(config)
+
+
 def between(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
     """Return the least distance (m) between two plans: d_min and the deviations of both.
 

@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 
-from companion.avoidance.certified.margins import between, fastest, margin
+from companion.avoidance.certified.margins import between, fastest, further, sideways
 from companion.config import CompanionConfig
 from companion.errors import CompanionError
 from companion.values.horizon import Array
@@ -26,14 +26,14 @@ def plan_sides(config: CompanionConfig) -> Array | None:
     if reach is None:
         return None
     field, limits = config.field, config.limits
-    margins = 2.0 * margin(certified, field, limits)
-    near = max(1.0, field.downwash) * between(certified, field, limits)
+    margins = 2.0 * sideways(certified, field, limits)
+    near = between(certified, field, limits) + 2.0 * further(certified)
     closing = 2.0 * fastest(limits) * 2e-6 * (certified.contact_us + certified.epoch_us)
     least = margins + near + closing + 2.0 * _ROUNDING_M
     if reach <= least:
         raise CompanionError(
             f"certified.range = {reach:g} m leaves no room for plans; more than {least:.3f} m is allowed"
-            " with this d_min, margin, v_max, contact_us and epoch_us"
+            " with this d_min, margin, drift, v_max, contact_us and epoch_us"
         )
     shape = np.array([1.0, 1.0, _FLAT if config.planar else 1.0])
     sides: Array = 0.5 * (reach - least) / sqrt(float(shape @ shape)) * shape

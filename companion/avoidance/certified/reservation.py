@@ -91,10 +91,13 @@ class Reservation:
             near -= {system for system in self._agreements.columns if system > self._agreements.own}
         return not near
 
-    def watch(self, now: int) -> None:
-        """Note since when (µs) nothing is missing for the reservation of the newest plan, a column."""
+    def watch(self, now: int, *, listens: bool = False) -> None:
+        """Note since when (µs) nothing is missing for the reservation of the newest plan, a column.
+
+        ``listens``: with a range, the companion may have heard too little yet of who is within it.
+        """
         column = self._commitment.column
-        if not column or self._agreements.unreserved():
+        if not column or listens or self._agreements.unreserved():
             self._since = None
         elif self._since is None:
             self._since = now

@@ -4,15 +4,17 @@ A vehicle counts another from a message of it on that does not show that it is b
 that does. Only those that it counts need agreements. All points of a plan lie within a box (``plan_sides``),
 so that two vehicles of which one does not count the other cannot meet before they have heard each other; the
 condition and its proof are in docs/certified.md.
+
+The range is a horizontal distance: a vehicle that takes off or lands may be at any height.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from math import hypot
 
 import numpy as np
 
-from companion.avoidance.certified.margins import fastest, margin
+from companion.avoidance.certified.margins import fastest, sideways
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.config import CompanionConfig
 from companion.errors import CompanionError
@@ -26,7 +28,7 @@ class Vicinity:
         certified = config.certified
         if certified.range is None:
             raise CompanionError("certified.range is null")
-        self._beyond = certified.range + 2.0 * margin(certified, config.field, config.limits)
+        self._beyond = certified.range + 2.0 * sideways(certified, config.field, config.limits)
         self._speed, self._knots = fastest(config.limits), certified.knots
 
     def beyond(self, now: int, place: Array, plan: StoredPlan) -> bool:
@@ -40,8 +42,8 @@ class Vicinity:
             (begins, plan.controls[0, 0]),
             (begins + length, plan.rested[self._knots - 1, 2]),
         ):
-            apart = place - there
-            if sqrt(float(apart @ apart)) - 1e-6 * abs(now - time) * self._speed > self._beyond:
+            apart = hypot(place[0] - there[0], place[1] - there[1])
+            if apart - 1e-6 * abs(now - time) * self._speed > self._beyond:
                 return True
         return False
 

@@ -110,6 +110,22 @@ def test_rows_are_chosen_by_the_beginning_of_their_labels(
     assert (tmp_path / "out" / "compare.md").is_file()
 
 
+def test_some_rows_of_a_comparison_that_was_flown_whole_are_in_its_folder_already(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing is refused, nothing is flown twice, and the table keeps all rows."""
+
+    def labels(*rows: str) -> list[str]:
+        assert compare("rmader", 1, 1, tmp_path, as_json=True, rows=rows, run=f"{__name__}:fly") == 0
+        return [row["row"] for row in json.loads(capsys.readouterr().out)["rows"]]
+
+    every = labels()
+    journal = (tmp_path / "journal.jsonl").read_text()
+    assert len(journal.splitlines()) == 1 + len(every) > 2
+    assert labels("loss 50") == every
+    assert (tmp_path / "journal.jsonl").read_text() == journal
+
+
 def test_faults_are_refused_before_anything_flies(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such row; rows are delay 0 ms"):
         compare("rmader", rows=("speed",), out=tmp_path / "out")

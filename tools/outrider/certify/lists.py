@@ -180,9 +180,9 @@ def listings(
     }
     findings: list[Finding] = []
     farewell: int | None = None
-    reservations = Reservations(history, terms)
     reach = terms.reach
     ranges = None if reach is None else Ranges(history, others, terms, reach)
+    reservations = Reservations(history, terms, ranges)
     columns = log.orders or any(step.plan.column for step in history.steps)
     records: list[LoggedPlan | LoggedStatement | Order] = sorted(
         chain(log.sightings, log.statements, log.orders), key=lambda record: record.number

@@ -6,19 +6,19 @@ rules it had not heard the other within the range, and by the assumption about e
 agreement is dropped for the range alone only while the two are certainly beyond it. On each axis a plan made
 anew is no longer than its box, or than the plan before.
 
-Places are those of plans at the beginnings of epochs, and what two vehicles can approach each other between
-them is tolerated.
+Distances are horizontal. Places are those of plans at the beginnings of epochs, and what two vehicles can
+approach each other between them is tolerated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import dist
+from math import hypot
 
 import numpy as np
 
 from companion.avoidance.certified.committed import carried_on, controls
-from companion.avoidance.certified.margins import fastest, margin
+from companion.avoidance.certified.margins import fastest, sideways
 from companion.avoidance.certified.plan_sides import plan_sides
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
@@ -38,6 +38,7 @@ class Ranges:
         self._terms, self._reach = terms, reach
         self._own = _places(history)
         self._others = {other.system: _places(other) for other in others}
+        self._unheard: dict[tuple[int, int], bool] = {}
 
     def may_be_unheard(self, system: int, epoch: int) -> tuple[bool, str]:
         """Return whether a plan of ``epoch`` (µs) may be made without an agreement with ``system``.
@@ -49,18 +50,26 @@ class Ranges:
         allowed = most > self._reach.range - self._reach.margins
         return allowed, "" if allowed else f"at most {most:.3f} m apart in the time before"
 
+    def is_unheard(self, system: int, time: int) -> bool:
+        """Return whether at ``time`` (µs) a column may be reserved without an agreement with ``system``."""
+        key = system, time // self._terms.epoch
+        if key not in self._unheard:
+            self._unheard[key] = self.may_be_unheard(system, key[1] * self._terms.epoch)[0]
+        return self._unheard[key]
+
     def may_part(self, system: int, since: int, until: int) -> bool:
         """Return whether agreements with ``system`` may have been dropped between two epochs (µs)."""
         return self._most(system, since - self._terms.epoch, until) > self._reach.range + self._reach.margins
 
     def _most(self, system: int, begins: int, ends: int) -> float:
-        """Return the largest distance (m) between two epochs (µs), those in between included."""
+        """Return the largest horizontal distance (m) in two epochs (µs) and those in between."""
         theirs, length = self._others.get(system), self._terms.epoch
         if not theirs or not self._own:
             return np.inf
         first = begins - begins % length
-        apart = (dist(self._at(self._own, e), self._at(theirs, e)) for e in range(first, ends + 1, length))
-        return max(apart) + 1e-6 * self._reach.speed * length
+        pairs = ((self._at(self._own, e), self._at(theirs, e)) for e in range(first, ends + 1, length))
+        apart = max(hypot(one[0] - two[0], one[1] - two[1]) for one, two in pairs)
+        return apart + 1e-6 * self._reach.speed * length
 
     def _at(self, places: dict[int, _Place], epoch: int) -> _Place:
         """Return the place at ``epoch`` (µs): that of the last epoch with a plan before, or of the first."""
@@ -102,6 +111,6 @@ def reach_of(config: CompanionConfig) -> Reach | None:
     if sides is None or certified.range is None:
         return None
     east, north, up = sides.tolist()
-    margins = 2.0 * margin(certified, config.field, config.limits)
+    margins = 2.0 * sideways(certified, config.field, config.limits)
     speed = fastest(config.limits)
     return Reach(certified.range, certified.contact_us, margins, (east, north, up), speed)

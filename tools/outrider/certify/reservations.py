@@ -11,6 +11,7 @@ from mavlink_bridge.wire.agreements import Epochs
 from mavlink_bridge.wire.plan import WirePlan
 from outrider.certify.evidence import Finding, Order, Terms
 from outrider.certify.histories import History, Kind
+from outrider.certify.ranges import Ranges
 
 _SLACK_US = 20_000
 """Time (µs) by which a record may be written after the step of the companion to which it belongs."""
@@ -43,10 +44,13 @@ class Peer(Protocol):
 
 
 class Reservations:
-    """Since when the column of one vehicle is reserved, as its log is gone through."""
+    """Since when the column of one vehicle is reserved, as its log is gone through.
 
-    def __init__(self, history: History, terms: Terms) -> None:
-        self._owner, self._terms = history.system, terms
+    With ``ranges`` an agreement is needed with those alone that were within the range.
+    """
+
+    def __init__(self, history: History, terms: Terms, ranges: Ranges | None = None) -> None:
+        self._owner, self._terms, self._ranges = history.system, terms, ranges
         self._steps = history.steps
         self._columns = {step.plan.epoch for step in history.steps if step.plan.column}
         self._since: int | None = None
@@ -60,7 +64,9 @@ class Reservations:
         self._unreserved = {
             system
             for system in self._terms.fleet
-            if system != self._owner and not self._keeps(peers.get(system))
+            if system != self._owner
+            and not self._keeps(peers.get(system))
+            and not (self._ranges is not None and self._ranges.is_unheard(system, time))
         }
         if self._unreserved:
             self._since = None

@@ -41,7 +41,8 @@ def compare(
     """Fly the comparison ``name``, a file or a shipped one, and return the exit status.
 
     The status is 0 if every flight succeeded, 1 if one did not, and 3 after an interruption. A missed bar is
-    a result, not an error. ``rows``: labels to fly, or beginnings of labels; by default all. ``missions``: a
+    a result, not an error. ``rows``: labels to fly, or beginnings of labels; by default all. The tables have
+    these rows, and all others of which each seed is in the journal already. ``missions``: a
     folder with mission files of LSC's planners, in place of drawn ones; ``worlds``: one with their world
     files. Writes ``compare.json``,
     ``compare.md`` and ``compare.png`` beside the journal in ``out`` (default ``runs/sweep-compare-NAME``).
@@ -49,15 +50,21 @@ def compare(
     path = find("comparisons", name)
     comparison = load(path, Comparison)
     chosen = _chosen(comparison, rows)
-    found = cells_of(comparison, path, chosen, missions, worlds)
+    # The journal is that of all rows, so that some of them are flown first, and others later. A folder of
+    # missions or worlds may have those of the chosen rows alone.
+    rows_of = comparison.rows if missions is None and worlds is None else chosen
+    every = cells_of(comparison, path, rows_of, missions, worlds)
+    cells = dict(zip((row.label for row in rows_of), every, strict=True))
     title = f"compare-{comparison.name}"
     folder = places.prepare(out, title)
     numbers = range(TRACED, TRACED + (seeds or comparison.seeds))
-    entries = flown(header(title, found), found, numbers, folder, run, jobs)
+    entries = flown(header(title, every), [cells[row.label] for row in chosen], numbers, folder, run, jobs)
     if entries is None:
         return INTERRUPTED
+    shown = [row for row in rows_of if row in chosen or _is_flown(cells[row.label], entries, numbers)]
+    found = [cells[row.label] for row in shown]
     results = [
-        _result(comparison, row, cell, entries, numbers) for row, cell in zip(chosen, found, strict=True)
+        _result(comparison, row, cell, entries, numbers) for row, cell in zip(shown, found, strict=True)
     ]
     document: dict[str, Any] = {
         "comparison": comparison.name,
@@ -66,7 +73,7 @@ def compare(
         "goal_radius_m": comparison.goal_radius,
         "rows": [result.document() for result in results],
         "published": [
-            one.model_dump() for one in comparison.published if one.row in {row.label for row in chosen}
+            one.model_dump() for one in comparison.published if one.row in {row.label for row in shown}
         ],
         "differences": list(comparison.differences),
     }
@@ -90,6 +97,11 @@ def _chosen(comparison: Comparison, labels: tuple[str, ...]) -> tuple[Row, ...]:
     return tuple(
         row for row in comparison.rows if not labels or any(row.label.startswith(label) for label in labels)
     )
+
+
+def _is_flown(cell: Cell, entries: Flown, numbers: range) -> bool:
+    """Return whether the journal has a flight of ``cell`` with each seed of ``numbers``."""
+    return all((cell.key, seed) in entries for seed in numbers)
 
 
 def _result(comparison: Comparison, row: Row, cell: Cell, entries: Flown, numbers: range) -> Result:

@@ -145,8 +145,8 @@ class FlyConfig(Settings):
             )
         if self.companion.certified.range is not None:
             raise ValueError(
-                f"companion.certified.range is {self.companion.certified.range:g}: vehicles that take off "
-                "and land need agreements with all others; allowed: null"
+                f"companion.certified.range is {self.companion.certified.range:g}: how far the radios of "
+                "real vehicles reach is not checked, and it was flown in simulation alone; allowed: null"
             )
         if not self.companion.certified.fleet:
             raise ValueError(

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib import import_module
-from math import ceil
 from typing import NamedTuple
 
-from companion.avoidance.certified.margins import fastest, margin
-from companion.avoidance.certified.plan_sides import plan_sides
-from companion.errors import CompanionError
 from mavlink_bridge.frames import FleetFrame
 from outrider.errors import Fault, InputError
 from outrider.resources import config_root, find
 from outrider.runs.outcome import Outcome
 from outrider.runs.summary import WALL_FIELDS, Cost, Value, summarise
-from outrider.scenarios.companion_settings import settings_of
 from outrider.scenarios.faults import MotorFailure
 from outrider.scenarios.feasibility import obstacles_to
 from outrider.scenarios.options import Options, apply
+from outrider.scenarios.radio_range import against_range
 from outrider.scenarios.scenario import RecordedTarget, Scenario
 from outrider.simulation.flight import Flight
 from outrider.simulation.targets import load as load_log
@@ -66,37 +62,11 @@ def prepared(scenario: Scenario, where: str) -> Prepared:
     ]
     if vehicle.motion == "point":
         wrong += [Fault(where, reason) for reason in _not_for_points(scenario)]
-    wrong += [Fault(where, reason) for reason in _against_range(scenario)]
+    wrong += [Fault(where, reason) for reason in against_range(scenario)]
     wrong += [Fault(where, reason) for reason in obstacles_to(scenario, vehicle.span)]
     if wrong:
         raise InputError(*wrong)
     return Prepared(scenario, vehicle)
-
-
-def _against_range(scenario: Scenario) -> Iterator[str]:
-    """Yield what a scenario has that committed plans with a limited range do not allow."""
-    certified = scenario.companion.certified
-    if certified.range is None or scenario.companion.avoidance != "certified":
-        return
-    if not scenario.airborne:
-        yield (
-            f"companion.certified.range is {certified.range:g}, but airborne is false: columns are not "
-            "agreed with who is not heard; allowed: null, or airborne: true"
-        )
-    settings = settings_of(scenario)
-    try:
-        plan_sides(settings)
-    except CompanionError as error:
-        yield f"companion.{error}"
-    radio, limits = scenario.links.swarm.range, settings.limits
-    parted = 2e-6 * fastest(limits) * certified.epoch_us
-    least = certified.range + 2.0 * margin(settings.certified, settings.field, limits) + parted
-    if radio is not None and radio <= least:
-        yield (
-            f"links.swarm.range is {radio:g} m, so that a vehicle that leaves companion.certified.range = "
-            f"{certified.range:g} m is not heard to leave; allowed with this margin, v_max and epoch_us: "
-            f"more than {ceil(1e3 * least) / 1e3:.3f} m, or null"
-        )
 
 
 def _not_for_points(scenario: Scenario) -> Iterator[str]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.committed import carried_on, controls
 from companion.avoidance.certified.fingerprint import FleetIdentity
-from companion.avoidance.certified.margins import between, fastest, margin
+from companion.avoidance.certified.margins import between, fastest, further, sideways
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.pair import Agreement, Pair
 from companion.avoidance.certified.peer_plans import StoredPlan, stored
@@ -25,7 +25,7 @@ from companion.values.horizon import Array
 from mavlink_bridge.wire.agreements import Entry
 from mavlink_bridge.wire.plan import pack
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS, curves, random_plan
-from tests.companion.avoidance.certified.swarm import EXACT, TICK, Habits, Rough, Swarm
+from tests.companion.avoidance.certified.swarm import EXACT, NEVER, TICK, Habits, Rough, Swarm
 from tests.companion.avoidance.certified.two import (
     DISTANCES,
     FRAME,
@@ -39,7 +39,7 @@ from tests.companion.avoidance.certified.two import (
 )
 
 RANGE, CONTACT, V_MAX = 8.0, 300_000, (1.5, 1.5, 0.3)
-FLOWN = {"range": RANGE, "contact_us": CONTACT, "tube": 0.05, "clock_us": 0, "sigmas": 0.0}
+FLOWN = {"range": RANGE, "contact_us": CONTACT, "tube": 0.05, "drift": 0.05, "clock_us": 0, "sigmas": 0.0}
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -60,35 +60,36 @@ def config(**certified: Any) -> CompanionConfig:
     st.floats(0.0, 2.0),
     st.integers(20_000, 400_000),
     st.booleans(),
-    st.sampled_from([1.0, 2.5]),
+    st.sampled_from([0.05, 0.3]),
 )
 @settings(max_examples=60, deadline=None)
 def test_who_was_beyond_in_the_last_two_contacts_is_not_met(
-    seed: int, reach: float, sigmas: float, contact: int, planar: bool, downwash: float
+    seed: int, reach: float, sigmas: float, contact: int, planar: bool, drift: float
 ) -> None:
-    """Whatever both do meanwhile at the speeds of plans, and along plans that are short enough."""
-    of = config(range=reach, contact_us=contact, sigmas=sigmas)
-    field = of.field.model_copy(update={"downwash": downwash})
-    of = of.model_copy(update={"planar": planar, "field": field})
+    """Whatever both do meanwhile at the speeds of plans, and along plans that are short enough.
+
+    Seen from above: so it does not matter whether one of the two, or both, land or take off.
+    """
+    of = config(range=reach, contact_us=contact, sigmas=sigmas, drift=drift)
+    of = of.model_copy(update={"planar": planar})
     try:
         sides = plan_sides(of)
     except CompanionError:
         return
     assert sides is not None
     rng = np.random.default_rng(seed)
-    flat = np.array([1.0, 1.0, 0.0 if planar else 1.0])
-    way = flat * rng.normal(size=(500, 3))
+    way = rng.normal(size=(500, 2))
     way /= np.linalg.norm(way, axis=1)[:, None]
     # True places were beyond the range; plans differ from them.
-    apart = (reach - 2.0 * margin(of.certified, field, of.limits)) * way
+    apart = (reach - 2.0 * sideways(of.certified, of.field, of.limits)) * way
     meanwhile = 1e-6 * (2 * contact + 2 * of.certified.epoch_us) * fastest(of.limits)
     sharpness = rng.uniform(0.0, 0.3, (500, 1))
     for _ in range(2):
-        towards = -way + sharpness * flat * rng.normal(size=(500, 3))
+        towards = -way + sharpness * rng.normal(size=(500, 2))
         apart = apart + meanwhile * towards / np.linalg.norm(towards, axis=1)[:, None]
-        apart = apart - np.sign(way) * sides * rng.uniform(0.9, 1.0, (500, 3))
-    least = between(of.certified, field, of.limits)
-    assert (np.linalg.norm(apart / (1.0, 1.0, downwash), axis=1) >= least).all()
+        apart = apart - np.sign(way) * sides[:2] * rng.uniform(0.9, 1.0, (500, 2))
+    least = between(of.certified, of.field, of.limits) + 2.0 * further(of.certified)
+    assert (np.linalg.norm(apart, axis=1) >= least).all()
 
 
 def test_a_range_without_room_for_plans_is_refused() -> None:
@@ -141,8 +142,8 @@ def test_who_seems_beyond_is_beyond_however_old_the_plan_is(seed: int, later: in
     nearest = int(np.argmin(since))
     there = ends[nearest] + since[nearest] * steps
     possible = there[np.linalg.norm(there - ends[1 - nearest], axis=1) <= since[1 - nearest]]
-    margins = 2.0 * margin(of.certified, of.field, of.limits)
-    assert (np.linalg.norm(possible - place, axis=1) > RANGE + margins).all()
+    margins = 2.0 * sideways(of.certified, of.field, of.limits)
+    assert (np.linalg.norm((possible - place)[:, :2], axis=1) > RANGE + margins).all()
 
 
 def limited(far: float = 10.0) -> Agreements:
@@ -241,6 +242,47 @@ def test_a_fleet_with_a_range_stays_apart_and_arrives(loss: float) -> None:
     np.testing.assert_allclose(ends, goals, atol=0.05)
     parted = [vehicle.flight.agreements for vehicle in swarm.vehicles]
     assert any(len(one.members) < 2 for one in parted)
+
+
+LOW = {**FLOWN, "range": 4.0}
+"""For vehicles that fly so slowly that they may stop in short plans, one high above another."""
+SLOW = (0.4, 0.4, 0.4)
+
+
+def above(lands: int, aside: float) -> Swarm:
+    """Vehicle 1 hovers 6 m above the other, beyond the range, and is to land; the other flies ``aside``."""
+    starts = np.array([[0.0, 0.0, 9.5], [0.0, 0.0, 3.5]])
+    habits = [Habits(lands=lands), Habits()]
+    swarm = Swarm(starts, Rough(0.2, 60_000), habits, 5, strangers=True, settings=LOW, v_max=SLOW)
+    goals = starts + np.array([[0.0, 0.0, 0.0], [aside, 0.0, 0.0]])
+    swarm.run(11_000_000, lambda _since, system: goals[system - 1])
+    return swarm
+
+
+def test_nobody_lands_on_a_vehicle_far_below() -> None:
+    """It is counted at whatever height, so that no agreement on a column above it is made."""
+    swarm = above(1_500_000, aside=0.0)
+    assert not swarm.vehicles[0].columns
+    assert not swarm.unflagged()
+    moved = above(1_500_000, aside=1.5)
+    assert moved.vehicles[0].columns
+    assert moved.least() >= moved.d - moved.exact
+
+
+@pytest.mark.parametrize("loss", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
+def test_vehicles_with_a_range_take_off_meet_and_land(loss: float) -> None:
+    """One goes from the ground to a place beside the others, which it does not hear at first; all land."""
+    starts = np.array([[0.0, 0.0, 5.0], [6.5, 0.0, 5.0], [8.0, 1.5, 5.0]])
+    goals = np.array([[4.0, 0.5, 5.0], [6.0, 0.0, 5.0], [8.0, 1.0, 5.0]])
+    habits = [Habits(takes_off=0, lands=14_000_000), Habits(lands=15_000_000), Habits(lands=14_500_000)]
+    rough = Rough(loss, 60_000, reach=6.0)
+    swarm = Swarm(starts, rough, habits, 3, strangers=True, planar=True, settings=LOW, v_max=(0.8, 0.8, 0.2))
+    swarm.run(19_000_000, lambda _since, system: goals[system - 1])
+    assert swarm.least() >= swarm.d - swarm.exact
+    assert not set(swarm.faults()) - {"no agreement in common"}
+    assert all(vehicle.columns and vehicle.columns[-1][1] == NEVER for vehicle in swarm.vehicles)
+    climbs, _ = swarm.vehicles[0].columns
+    assert climbs[0] >= 2 * CONTACT - TICK
 
 
 def test_nobody_moves_before_he_has_listened() -> None:
