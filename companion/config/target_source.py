@@ -83,6 +83,12 @@ class OwnErrors(Settings):
         description="µs, σ of the images' times that all vehicles have in common; the target's speed makes it"
         " an error of its place",
     )
+    sigma_image_us: float = Field(
+        5000.0,
+        ge=0.0,
+        le=500_000.0,
+        description="µs, σ of the images' times of one vehicle beside that, not in common with the others",
+    )
 
 
 _GNSS_ERRORS = OwnErrors()
@@ -140,7 +146,9 @@ class FusedSource(Settings):
         0.3, gt=0.0, le=45.0, description="degrees, σ across the ray, where a camera does not say"
     )
     sigma_acceleration: Positive = Field(
-        1.0, description="m/s², of the target's horizontal acceleration, each axis; the least that is assumed"
+        1.0,
+        description="m/s², of the target's horizontal acceleration, each axis; half of it is the least"
+        " assumed",
     )
     sigma_climb: Positive = Field(0.2, description="m/s², of its vertical acceleration")
     acceleration_s: float = Field(
@@ -150,7 +158,8 @@ class FusedSource(Settings):
         20.0,
         ge=1.0,
         le=1000.0,
-        description="factor by which both σ grow at most, if detections show more acceleration; 1: none",
+        description="factor by which both σ grow at most, if detections show more acceleration; if they show"
+        " less, both shrink to half at most; 1: neither",
     )
     adapt_s: float = Field(
         10.0, ge=0.1, le=3600.0, description="s, time constant at which they forget detections"

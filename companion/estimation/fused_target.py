@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.config import CompanionConfig
 from companion.config.target_source import FusedSource
 from companion.estimation.detections import Detection, detection
-from companion.estimation.fusion import Belief, Fusion
+from companion.estimation.fusion import Belief, Fusion, Seen
 from companion.estimation.fusion_filter import worst_sigma
 from companion.estimation.fusion_log import Counts, FusionLog, FusionTally
 from companion.estimation.tracks import State
@@ -24,8 +24,15 @@ from mavlink_bridge.frames import FleetFrame, Point
 from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo
 
 _MAX_DISTANCE_M = 1e5
-_RECENT_US, _SEEN_US = 2_000_000, 500_000
-"""Time (µs) over which the cameras' weights are measured, and in which a detection counts as seeing now."""
+_SPANS_US = 2_000_000, 4_000_000, 8_000_000, 16_000_000
+"""Times (µs) over which the cameras' weights are measured.
+
+It is the shortest with ``_EVIDENCE`` detections of a neighbour: where most messages are lost, none may arrive
+within two seconds of a camera that sees.
+"""
+_EVIDENCE = 10
+_SEEN_US = 500_000
+"""Time (µs) in which a detection counts as seeing now."""
 
 
 _NOTHING_ASKED = None, None
@@ -156,7 +163,7 @@ class FusedTarget:
 
     def sight(self, now: int, ahead: float) -> Sight:
         """Return what is known beside the state; the horizon ends ``ahead`` (s) after ``now`` (µs)."""
-        recent = self._fusion.recent(now - _RECENT_US - self._source.latency_us)
+        recent = self._measured(now)
         if not recent:
             return Sight()
         weights = {}
@@ -172,6 +179,16 @@ class FusedTarget:
             # −½(λ₁ − λ₂) e^{2iφ₁} of the information in the plane.
             prior = complex(0.5 * (a - d), b) / (a * d - b * b)
         return Sight(MappingProxyType(weights), prior)
+
+    def _measured(self, now: int) -> dict[int, Seen]:
+        """Return the detections over the span that tells which cameras see; empty if none is recent."""
+        found: dict[int, Seen] = {}
+        for span in _SPANS_US:
+            found = self._fusion.recent(now - span - self._source.latency_us)
+            best = max((one.number for other, one in found.items() if other != self._system), default=0)
+            if not found or best >= _EVIDENCE:
+                break
+        return found
 
     def _known(self, time: int) -> Belief | None:
         """Return what is known at ``time`` (µs); None before the first detection.

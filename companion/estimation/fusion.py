@@ -9,6 +9,7 @@ passes for a while and the refused ones agree with each other, the filter begins
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections import deque
 from math import log, radians
 from typing import NamedTuple
 
@@ -34,6 +35,8 @@ _CAPACITY = 512
 """Largest number of detections that are kept."""
 _WINDOW_SHARE = 2
 """Detections of at least the window, and of this many windows at most, are kept."""
+_REMEMBERED = 16
+"""Number of detections of each vehicle that passed and are remembered for longer than the window."""
 _RESTART_US, _WITNESSES, _AGREE_M, _AGREE_M_S = 1_000_000, 3, 2.0, 3.0
 """After this time without a passing detection so many refused ones restart the filter that agree.
 
@@ -60,6 +63,9 @@ class Seen(NamedTuple):
     weight: float
 
 
+_UNSEEN = Seen(0, 0.0)
+
+
 class Fusion:
     """Filter of all detections; times are the companion's own, in µs.
 
@@ -83,6 +89,7 @@ class Fusion:
         self._vehicles = np.zeros(_CAPACITY, dtype=np.int64)
         self._weights = np.zeros(_CAPACITY)
         self._newest = 0
+        self._earlier: dict[int, deque[tuple[int, float]]] = {}
         self._began: int | None = None
         self._passed: int | None = None
         self._x0, self._P0, self._memory0 = np.zeros(TARGET), np.zeros((TARGET, TARGET)), np.zeros(ADAPTED)
@@ -143,7 +150,10 @@ class Fusion:
         return Belief(passed, state[:3], state[3:], covariance)
 
     def recent(self, since: int) -> dict[int, Seen]:
-        """Return the detections of images from ``since`` (µs) on that passed, by vehicle."""
+        """Return the detections of images from ``since`` (µs) on that passed, by vehicle.
+
+        Of those older than the window, at least the last ``_REMEMBERED`` of each vehicle count.
+        """
         self._process()
         count = len(self._detections)
         rows = slice(int(self._times[:count].searchsorted(since)), count)
@@ -151,11 +161,19 @@ class Fusion:
         vehicles = self._vehicles[rows][used]
         numbers = np.bincount(vehicles)
         sums = np.bincount(vehicles, self._weights[rows][used])
-        return {
+        found = {
             system: Seen(number, total / number)
             for system, (number, total) in enumerate(zip(numbers.tolist(), sums.tolist(), strict=True))
             if number
         }
+        if count and since < int(self._times[0]):
+            for system, earlier in self._earlier.items():
+                weights = [weight for time, weight in earlier if time >= since]
+                if weights:
+                    number, mean = found.get(system, _UNSEEN)
+                    total = number + len(weights)
+                    found[system] = Seen(total, (number * mean + sum(weights)) / total)
+        return found
 
     @property
     def innovations(self) -> Array:
@@ -254,6 +272,9 @@ class Fusion:
         count, used = len(self._detections), int(np.count_nonzero(self._used[:old]))
         self._forgotten_used += used
         self._forgotten_refused += old - used
+        for row in np.flatnonzero(self._used[:old]).tolist():
+            earlier = self._earlier.setdefault(int(self._vehicles[row]), deque(maxlen=_REMEMBERED))
+            earlier.append((int(self._times[row]), float(self._weights[row])))
         self._began = int(self._times[old - 1])
         self._x0, self._P0 = self._states[old - 1].copy(), self._covariances[old - 1].copy()
         self._memory0 = self._memories[old - 1].copy()
@@ -301,7 +322,8 @@ def _noise(config: FusedSource) -> Array:
     position, yaw = 1.0 / errors.position_s, radians(errors.sigma_yaw_deg) ** 2
     tilt = radians(errors.sigma_tilt_deg) ** 2
     target = [config.sigma_acceleration**2, config.sigma_climb**2, 1.0 / config.acceleration_s]
-    adaptation = [1.0 / config.adapt_s, 2.0 * log(config.adapt), 1e-6 * errors.age_us]
+    adaptation = [1.0 / config.adapt_s, 2.0 * log(config.adapt)]
+    times = [1e-6 * errors.age_us, (1e-6 * errors.sigma_image_us) ** 2]
     parts = [horizontal, position, horizontal, position, vertical, position]
     parts += [yaw, 1.0 / errors.yaw_s, tilt, 1.0 / errors.tilt_s]
-    return np.array([config.gate, errors.sigma_white**2, *target, *adaptation, *parts])
+    return np.array([config.gate, errors.sigma_white**2, *target, *adaptation, *times, *parts])

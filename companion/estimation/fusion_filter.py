@@ -11,13 +11,13 @@ The variance of the acceleration, one of both horizontal axes and one of the ver
 configured one. θ has a normal prior around 0 and follows the innovations y by recursive maximum likelihood
 with exponential forgetting. With S = cov y, u = S⁻¹y and the sensitivity D = ∂P/∂θ of the target's
 covariance, the score is ½(uᵀDu − tr S⁻¹D) and its information ½ tr (S⁻¹D)². In D the target's correlation
-with the vehicles' errors is left out. θ is not negative: innovations that are smaller than S, as with cameras
-that understate their accuracy, would otherwise make the filter trust the motion far too much.
+with the vehicles' errors is left out. The σ of the acceleration is at least ``LEAST_SHARE`` of the configured
+one, because innovations of a straight walk say nothing of the next corner.
 """
 
 from __future__ import annotations
 
-from math import exp, sqrt
+from math import exp, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,15 +33,15 @@ FIELDS = 22
 Place (3), covariance R of the camera alone (9, by rows), directions (3) into which yaw and elevation of the
 ray move the place, the camera's place (3), and the measured distance; m.
 """
-_GATE, _WHITE, _VARIANCES, _DECAY, _FORGET, _BOUND, _AGE, _ERRORS = 0, 1, 2, 4, 5, 6, 7, 8
+_GATE, _WHITE, _VARIANCES, _DECAY, _FORGET, _BOUND, _AGE, _TIME, _ERRORS = 0, 1, 2, 4, 5, 6, 7, 8, 9
 """Places in ``noise``."""
 NOISE = _ERRORS + 2 * PER_VEHICLE
 """Numbers of ``noise``.
 
 Gate; variance of a vehicle's position that is not in common (m²); variances of the target's horizontal and
 vertical acceleration (m²/s⁴); rates (1/s) at which the acceleration decays, and θ's information; bound of
-θ; age (s) of a vehicle's own position; variance and rate of decay (1/s) of each of the five errors of a
-vehicle.
+θ; age (s) of a vehicle's own position; variance (s²) of an image's time; variance and rate of decay (1/s) of
+each of the five errors of a vehicle.
 """
 GROUPS = 2
 """Number of variances of the acceleration."""
@@ -61,8 +61,11 @@ WHITE_SHARE = 0.02
 
 With it the velocity may change at once, as that of a recorded target does.
 """
-_PRIOR, _LEAST_INFORMATION = 1.0 / 9.0, 0.25
-"""Information of the prior of θ (σ = 3), and what is taken to be known at least, so that steps are small."""
+LEAST_SHARE = 0.5
+"""Least σ of the acceleration, as a share of the configured one."""
+_LEAST_THETA = 2.0 * log(LEAST_SHARE)
+_PRIOR, _LEAST_INFORMATION = 1.0, 0.25
+"""Information of the prior of θ (σ = 1), and what is taken to be known at least, so that steps are small."""
 _SERIES = 0.05
 """Below this time in time constants covariances are a series, because the closed form cancels."""
 _KNOWN, _LEAST_SCALE = 25.0, 0.25
@@ -216,7 +219,7 @@ def _adapt(
     gain = 1.0 / (known + _LEAST_INFORMATION)
     # What is forgotten is replaced by the prior.
     step = gain * (score - theta * (1.0 - keep) * _PRIOR)
-    memory[group] = min(max(theta + step, 0.0), noise[_BOUND])
+    memory[group] = min(max(theta + step, _LEAST_THETA), noise[_BOUND])
 
 
 @kernel(
@@ -327,6 +330,9 @@ def replay(
                     R[a, b] *= scale
                 # The velocity has a part of this error.
                 R[a, a] += noise[_WHITE] * (1.0 + lead) ** 2
+                for b in range(3):
+                    # An image that is late shows the target where it was.
+                    R[a, b] += noise[_TIME] * x[3 + a] * x[3 + b]
         for a in range(3):
             g, h = distance * data[i, 12 + a], distance * data[i, 15 + a]
             y[a] = data[i, a] + moved[a] - x[a]

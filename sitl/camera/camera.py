@@ -65,6 +65,7 @@ class Camera:
         self._beat = 0
         self._then = 0
         self._waiting: deque[Image] = deque()
+        self._turned: list[Message] = []
 
     def receive(self, message: HilState) -> None:
         """Receive the true place of a body."""
@@ -90,11 +91,16 @@ class Camera:
         believed = quaternion(found.roll, found.pitch, found.yaw)
         where = _point(np.add(found.position, self.mount.offset(believed)))
         pose = Pose(stamp, where, self.mount.attitude(believed))
+        if self.mount.on_gimbal:
+            self._turned.append(gimbal_attitude(self.gimbal, pose))
         self._waiting.append(Image(now + boot, view, pose, Draws.of(self._random)))
 
     def messages(self, now: int, boot: int) -> list[Message]:
-        """Return the messages due at ``now`` (µs since boot): heartbeats, and those of developed images."""
-        said: list[Message] = []
+        """Return the messages due at ``now`` (µs since boot).
+
+        They are the gimbal's attitude as an image is taken, heartbeats, and those of developed images.
+        """
+        said, self._turned = self._turned, []
         if now >= self._beat:
             self._beat += _BEAT_US * ((now - self._beat) // _BEAT_US + 1)
             said += self._heartbeats()
@@ -117,8 +123,6 @@ class Camera:
         said: list[Message] = []
         if config.fov_status:
             said.append(fov_status(self.source, camera, image.pose, geodetic))
-        if self.mount.on_gimbal:
-            said.append(gimbal_attitude(self.gimbal, image.pose))
         self.last = image.view, None
         if seen is None:
             return said

@@ -11,7 +11,7 @@ import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from math import degrees, radians, tan
+from math import cos, degrees, pi, radians, sin, tan
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
@@ -57,17 +57,54 @@ def _unequal(vehicles: int) -> Mapping[str, Any]:
     }
 
 
+def _worse(formation: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the changes for a fleet of which two cameras have three times the σ of the others."""
+    camera = {"mount": {"kind": "gimbal", "pitch_deg": 40.0}, "rate_hz": 10.0, "latency_ms": 100.0}
+    worse = {**camera, "pixel_sigma": 6.0, "object": {"height_sigma": 0.45}}
+    return {
+        "cameras": [{"vehicle": FIRST_SYSTEM + k, "camera": worse} for k in range(2)],
+        "companion": {"formation": formation},
+    }
+
+
+def _hidden(formation: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the changes for a target that rests, and is hidden by posts from two of five equal bearings."""
+    east, north = 12.0, 0.0
+    posts = [
+        {
+            "kind": "post",
+            "at": [east + 2.0 * cos(bearing), north + 2.0 * sin(bearing)],
+            "radius": 0.3,
+            "height": 5.0,
+        }
+        for bearing in (0.0, 0.4 * pi)
+    ]
+    return {
+        "target": {"kind": "fixed", "at": [east, north, 0.0]},
+        "obstacles": posts,
+        "companion": {"formation": formation},
+    }
+
+
+_LOSS: Mapping[str, Any] = {"links": {"swarm": {"loss": 0.2}}}
+_SPREAD: Mapping[str, Any] = {"kind": "spread"}
 CASES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "2": {"vehicles": 2},
         "3": {"vehicles": 3},
         "5": {},
         "8": {"vehicles": 8},
-        "5, loss 20 %": {"links": {"swarm": {"loss": 0.2}}},
+        "3, loss 20 %": {"vehicles": 3, **_LOSS},
+        "5, loss 20 %": _LOSS,
+        "8, loss 20 %": {"vehicles": 8, **_LOSS},
         "disturbed": {"camera": {"false_positives": 0.05, "missed": 0.2, "latency_ms": 200.0}},
         "3, unequal": _unequal(3),
         "5, unequal": _unequal(5),
         "certified": {"companion": {"avoidance": "certified"}},
+        "worse": _worse({}),
+        "worse, spread": _worse(_SPREAD),
+        "hidden": _hidden({}),
+        "hidden, spread": _hidden(_SPREAD),
     }
 )
 
@@ -161,7 +198,7 @@ def nees(off: Array, covariances: Array) -> tuple[float, float]:
     """Return the mean of the squared normalised errors ``off`` (n, m), and its degrees of freedom.
 
     ``covariances`` (n, m, m); the mean is m if they are right.
-    Successive errors are not independent: n rows with the correlation time τ (rows) are n/τ numbers.
+    Successive errors are not independent: the squares of n rows are about n/τ independent numbers.
     """
     normalised = np.linalg.solve(np.linalg.cholesky(covariances), off[..., None])[..., 0]
     inverse = sum(_correlation_time(axis) / len(axis) for axis in normalised.T)
@@ -169,13 +206,17 @@ def nees(off: Array, covariances: Array) -> tuple[float, float]:
 
 
 def _correlation_time(values: Array) -> float:
-    """Return 1 + 2 Σ r_k up to the first zero of the autocorrelation."""
-    centred = values - values.mean()
-    power = np.abs(np.fft.rfft(centred, 2 * len(values))) ** 2
+    """Return τ = 1 + 2 Σ r_k² (rows) of the squares of ``values`` (n,), up to the first zero of r.
+
+    r is the autocorrelation about zero, the expected value: about the mean of the flight, a bias that lasts
+    longer than it, as with ``gnss``, would count as many independent numbers. Squares of normal numbers with
+    the correlation r have the correlation r².
+    """
+    power = np.abs(np.fft.rfft(values, 2 * len(values))) ** 2
     correlation = np.fft.irfft(power)[: len(values)]
     correlation /= correlation[0]
     first = int(np.argmax(correlation < 0.0)) or len(values)
-    return float(1.0 + 2.0 * correlation[1:first].sum())
+    return float(1.0 + 2.0 * (correlation[1:first] ** 2).sum())
 
 
 def figures(case: str, sensors: str, seed: int, seconds: float) -> Figures:

@@ -71,13 +71,16 @@ class Vehicle:
         self._position = Process(random, [horizontal, horizontal, vertical], errors.position_s)
         self._yaw = Process(random, radians(errors.sigma_yaw_deg), errors.yaw_s)
         self._tilt = Process(random, radians(errors.sigma_tilt_deg), errors.tilt_s)
+        (self._late,) = random.spawn(1)
 
     def step(self, dt: float) -> None:
         for process in (self._position, self._yaw, self._tilt):
             process.step(dt)
 
-    def sees(self, time: int, target) -> Detection:
-        """What it detects of a target (3,), m."""
+    def sees(self, time: int, target, velocity=(0.0, 0.0, 0.0)) -> Detection:
+        """What it detects of a target (3,), m, with a velocity (3,), m/s, in an image of about then."""
+        late = 1e-6 * self._source.errors.sigma_image_us * self._late.normal()
+        target = np.asarray(target) - late * np.asarray(velocity)
         camera = np.array([6.0 * np.cos(self._bearing), 6.0 * np.sin(self._bearing), 5.0])
         ray = np.asarray(target) - camera
         distance = float(np.linalg.norm(ray))

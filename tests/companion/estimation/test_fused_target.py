@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
+from companion.estimation.fused_target import FusedTarget
 from companion.telemetry.reception import accepts
 from companion.world import World
 from mavlink_bridge.messages import (
@@ -25,7 +26,7 @@ from mavlink_bridge.messages import (
 from mavlink_bridge.pinhole import Pinhole, conjugate, extent, product, rotated, upward
 from mavlink_bridge.wire.codec import Codec
 from sitl.values.attitudes import quaternion
-from tests.companion.estimation.cameras import FLEET, START, message
+from tests.companion.estimation.cameras import FLEET, START, message, source_of
 
 OWN, NEIGHBOUR, TARGET = 11, 12, 1
 CAMERA = np.array([6.0, 0.0, 5.0])
@@ -376,3 +377,38 @@ def test_a_step_asks_the_filter_once_and_again_after_a_detection(monkeypatch):
     assert np.linalg.norm(after.position - before.position) > 0.01
     of.target.last(now + 1)
     assert asked == [now, now, now + 1]
+
+
+def lossy(share: float, hidden: int | None = None, seconds: float = 30.0):
+    """Yield the weights that vehicle 11 measures, each tenth of a second from 10 s on.
+
+    It receives its own detections, and those of 12, 13 and 14 with the probability ``share``; the vehicle
+    ``hidden`` sees nothing.
+    """
+    source = source_of("truth")
+    config = CompanionConfig.model_validate({"target": {"rewind_us": 2_000_000}})
+    of, random = FusedTarget(config, source, OWN, FLEET), np.random.default_rng(8)
+    cameras = {
+        system: np.array([6.0 * np.cos(1.57 * k), 6.0 * np.sin(1.57 * k), 5.0])
+        for k, system in enumerate((11, 12, 13, 14))
+    }
+    for tick in range(round(10.0 * seconds)):
+        now = START + 100_000 * tick
+        for system, camera in cameras.items():
+            if system == hidden or (system != OWN and random.uniform() > share):
+                continue
+            of.receive(now, now - 60_000, tuple(camera), None, message(system, PLACE, camera))
+        if tick > 100:
+            yield of.sight(now, 1.0).weights
+
+
+def test_a_camera_counts_though_most_of_its_messages_are_lost():
+    """Over two seconds, nine of ten lost, one of eight cameras would count as one that sees nothing."""
+    full = next(iter(lossy(1.0)))
+    found = [[weights.get(system, 0.0) / full[system] for system in full] for weights in lossy(0.1)]
+    assert np.min(found) > 0.2
+    assert np.mean(found) > 0.85
+
+
+def test_a_camera_that_sees_nothing_counts_for_nothing():
+    assert all(13 not in weights and len(weights) == 3 for weights in lossy(1.0, hidden=13))

@@ -35,6 +35,7 @@ EXACT = OwnErrors(
     sigma_tilt_deg=0.0,
     sigma_white=0.0,
     sigma_time_us=0.0,
+    sigma_image_us=0.0,
 )
 
 
@@ -48,7 +49,7 @@ def flight(profile, seed: int, seconds: float = 6.0, vehicles: int = 3):
         walker.step(1e-6 * STEP)
         for camera in cameras:
             camera.step(1e-6 * STEP)
-            found.append(camera.sees(START + tick * STEP, walker.place))
+            found.append(camera.sees(START + tick * STEP, walker.place, walker.velocity))
     return source, found, walker
 
 
@@ -409,6 +410,21 @@ def test_what_was_seen_recently_is_counted_by_vehicle_with_its_mean_weight():
         assert number == len(weights)
         assert weight == pytest.approx(np.mean(weights), rel=1e-12)
     assert fusion.recent(found[-1].time + 1) == {}
+
+
+def test_detections_beyond_the_window_are_remembered():
+    """Up to 16 of each vehicle, however long ago: of rare ones all count."""
+    source = source_of("truth")
+    camera, place, period = np.array([6.0, 0.0, 5.0]), np.zeros(3), 1_100_000
+    found = [
+        detection(source, 11, START + k * period, place, tuple(camera), message(11, place, camera))
+        for k in range(15)
+    ]
+    fusion = fused(source, [one for one in found if one is not None])
+    for count in (1, 3, 9, 15):
+        seen = fusion.recent(START + (15 - count) * period)
+        assert seen[11].number == count
+        assert seen[11].weight == pytest.approx(found[0].weight, rel=1e-6)
 
 
 def test_a_kernel_of_no_vehicle_and_no_detection_does_nothing():

@@ -64,6 +64,42 @@ def test_errors_on_other_paths_are_about_as_large_as_the_covariance_says(path):
     assert 1.5 < found < chi2.ppf(0.975, 3 * count) / count
 
 
+def spread(source: FusedSource, random, late, seconds: float = 9.0) -> float:
+    """Return tr P of a target that walks straight on; the images of each camera are ``late`` s late."""
+    cameras = [Vehicle(11 + k, 1.3 * k, source, random) for k in range(len(late))]
+    found = [
+        camera.sees(START + tick * STEP, line(1e-6 * tick * STEP - delay))
+        for tick in range(round(1e6 * seconds / STEP))
+        for camera, delay in zip(cameras, late, strict=True)
+    ]
+    return float(np.trace(at(fused(source, found), found[-1].time).covariance))
+
+
+def fixed(source: FusedSource) -> FusedSource:
+    return source.model_copy(update={"adapt": 1.0})
+
+
+def test_images_that_are_late_are_not_taken_for_accelerations():
+    """Cameras that disagree by their clocks make innovations larger, but the target walks straight on."""
+    source, random = source_of("truth", 0.35), np.random.default_rng(5)
+    larger = []
+    for _ in range(6):
+        late = 1e-6 * source.errors.sigma_image_us * random.normal(size=5)
+        larger.append(spread(source, random, late) / spread(fixed(source), random, late))
+    assert np.mean(larger) < 1.0
+
+
+def test_it_learns_that_the_target_accelerates_less_but_not_that_it_never_does():
+    """The covariance is between those of the configured σ and of half of it."""
+    source, random = source_of("truth", 0.5), np.random.default_rng(6)
+    half = source.model_copy(update={"sigma_acceleration": 0.25, "sigma_climb": 0.1})
+    adapted, known, least = (
+        np.mean([spread(one, random, [0.0] * 5) for _ in range(4)])
+        for one in (source, fixed(source), fixed(half))
+    )
+    assert least < adapted < 0.97 * known
+
+
 def test_it_learns_how_the_target_accelerates():
     """With a σ a tenth of the target's, the covariance is far too small unless it is adapted."""
     timid = source_of("truth", 0.06)
