@@ -214,6 +214,8 @@ class CertifiedFlight:
             inside = float(off @ off) <= self._config.certified.tube**2
             if inside and now >= rest_time(horizon):
                 commitment.leave_column()
+                # Its reservation ends here, also if the next step makes the plan a column again.
+                self.reservation.watch(now)
 
     def _hover(self, height: float) -> None:
         """Fly the column at ``height`` (m), while all agreements that are kept have upright planes."""

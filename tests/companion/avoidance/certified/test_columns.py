@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from companion.avoidance.certified import constraint_sources
@@ -84,6 +84,7 @@ def at_random(seed: int, rough: Rough) -> Swarm:
 
 @FLIGHTS
 @given(st.integers(0, 2**16), losses, delays)
+@example(597, 0.0, 500_000)  # lands in the step after it has left the column of its take-off
 def test_a_column_is_kept_whatever_happens(seed: int, loss: float, delay: int) -> None:
     """From the climb's beginning to its end, and from the landing's on, all plans are apart horizontally."""
     assert not at_random(seed, Rough(loss, delay, 0.2)).faults()
