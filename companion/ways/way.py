@@ -54,7 +54,7 @@ class Way:
     ) -> None:
         self._config, self._obstacles, self._limits = config, tuple(obstacles), limits
         self._clearances = [least + share * config.clearance for share in _SHARES]
-        self._parts, self._level = parts, np.nan
+        self._parts, self._level, self._planned = parts, np.nan, not planar
         # The clearances of a box take a tenth of a second or more: not in flight.
         self._clear = None if planar else self._clearance(None)
         self._followed: Followed | None = None
@@ -83,6 +83,15 @@ class Way:
             self._floor = floor
             self.forget()
 
+    def prepare(self, height: float) -> None:
+        """Work out the clearances and the lanes at ``height`` (m) of a planar vehicle, before it plans there.
+
+        They take a tenth of a second or more. The first plan does it if it is at another height.
+        """
+        if not self._planned:
+            self._clear_at(height)
+            self.lanes()
+
     def towards(self, place: Array, goal: Array) -> Subgoal:
         """Return the sub-goal of a plan that is made now, from ``place`` (3,) towards ``goal`` (3,), m.
 
@@ -95,10 +104,8 @@ class Way:
                 self.forget()
             self._step = step
         self._goal = goal
-        clear = self._clear
-        if clear is None:
-            self._level = float(place[2])
-            self._clear = clear = self._clearance(self._level)
+        clear = self._clear_at(float(place[2]))
+        self._planned = True
         height = float(goal[2])
         here, there = place, goal
         if self._level == self._level:
@@ -128,6 +135,13 @@ class Way:
         if self._lanes is None and clear is not None and apart is not None and self._level == self._level:
             self._lanes = Lanes(clear, self._clearances[-1], apart)
         return self._lanes
+
+    def _clear_at(self, height: float) -> Clearance:
+        """Return the clearances; those of a planar vehicle are at the ``height`` (m) of its first plan."""
+        if self._clear is None or not (self._planned or height == self._level):
+            self._level, self._lanes = height, None
+            self._clear = self._clearance(height)
+        return self._clear
 
     def _clearance(self, level: float | None) -> Clearance:
         """Return the clearances in the box, or at a ``level`` (m)."""

@@ -11,7 +11,7 @@ from companion.avoidance.certified.anticipation import anticipated_turn
 from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.commitment import Commitment, HoldReason
-from companion.avoidance.certified.committed import rest_time
+from companion.avoidance.certified.committed import controls, rest_time
 from companion.avoidance.certified.constraint_sources import BESIDE_M, ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.detour import Detour
@@ -163,6 +163,7 @@ class CertifiedFlight:
                 commitment.turn(now)
                 return
         self.agreements.begin(commitment.begin(now, position))
+        self._prepare()
         self.reservation.watch(now)
         commitment.anchored_anew += self._announced
         self._in_control = self._announced = False
@@ -216,6 +217,13 @@ class CertifiedFlight:
                 commitment.leave_column()
                 # Its reservation ends here, also if the next step makes the plan a column again.
                 self.reservation.watch(now)
+                self._prepare()
+
+    def _prepare(self) -> None:
+        """Work out what ways need at the height of the newest plan, while the vehicle holds its place."""
+        newest = self.commitment.announced()
+        if self._way is not None and newest is not None:
+            self._way.prepare(float(controls(newest)[-1, 2, 2]))
 
     def _hover(self, height: float) -> None:
         """Fly the column at ``height`` (m), while all agreements that are kept have upright planes."""

@@ -4,6 +4,8 @@ point that follows them arrives.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,9 +13,10 @@ from companion.config.obstacles import Box, Wall
 from companion.config.planning import LimitsConfig
 from companion.config.way import WayConfig
 from companion.obstacles.static import FixedObstacles
-from companion.ways.clearance import Clearance
+from companion.ways.clearance import Clearance, clearance_of
 from companion.ways.finding import finding
 from companion.ways.grid import grid
+from companion.ways.lattice import Lattice
 from companion.ways.search import Search
 from companion.ways.way import Way
 from tests.companion.ways.worlds import (
@@ -168,6 +171,33 @@ def test_a_low_wall_is_passed_above_except_by_a_vehicle_that_keeps_its_height() 
     places = flown(around, start, goal + UP)
     assert np.abs(places[-1] - goal)[:2].max() < 1e-6
     assert around.begun == 1
+
+
+@pytest.mark.parametrize("prepared", [5.0, 5.25])
+def test_the_first_plan_at_the_prepared_height_works_out_no_clearances(
+    prepared: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And it is the same plan as without preparation, also at another height."""
+    clearance_of.cache_clear()
+    place, goal = np.array([-6.0, 0.0, 5.0]), np.array([6.0, 0.5, 5.0])
+    plain, ready = (way(POCKET, planar=True, lanes=1.0) for _ in range(2))
+    expected = flown(plain, place, goal, steps=30)
+    clearance_of.cache_clear()
+    ready.prepare(prepared)
+    built: list[str] = []
+    for of in (Clearance, Lattice):
+
+        def init(self: object, *given: Any, _init: Any = of.__init__, _name: str = of.__name__) -> None:
+            built.append(_name)
+            _init(self, *given)
+
+        monkeypatch.setattr(of, "__init__", init)
+    assert (flown(ready, place, goal, steps=30) == expected).all()
+    lanes = ready.lanes()
+    assert lanes is not None
+    assert lanes is ready.lanes()
+    assert built == ([] if prepared == 5.0 else ["Clearance", "Lattice"])
+    assert ready.begun == plain.begun > 0
 
 
 def test_a_destination_that_moves_keeps_its_way_while_a_corner_sees_it() -> None:
