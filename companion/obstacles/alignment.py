@@ -10,7 +10,7 @@ from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, out
 from companion.values.horizon import Array
 
 
-def within(planned: Array, places: Array, strayed: float) -> NDArray[np.bool_]:
+def within(planned: Array, places: Array, strayed: float | Array) -> NDArray[np.bool_]:
     """Return which (M,) of the ``planned`` places (M, 3) are within ``strayed`` (m) of ``places`` (M, 3)."""
     off = planned - places
     return np.asarray(np.vecdot(off, off) <= strayed**2)

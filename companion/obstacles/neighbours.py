@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import chain, compress
-from math import inf
+from math import hypot, inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +26,12 @@ from companion.obstacles.relevance_filter import Ages, RelevanceFilter
 from companion.obstacles.shared_plans import SharedPlans
 from companion.obstacles.trusted_peers import TrustedPeers, follows
 from companion.obstacles.uncertainty import ReportedUncertainty
-from companion.obstacles.unheard import Unheard
+from companion.obstacles.unheard import Heard, Unheard
 from companion.values.components import COMPONENT
 from companion.values.horizon import Array
 from companion.values.mates import Mates
 from companion.values.obstacles import Obstacles
+from companion.values.speed_bounds import SpeedBounds
 from companion.values.vectors import limit
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame
@@ -373,27 +374,29 @@ class Neighbours:
 
         It is ∞ unless neighbours have been unheard for ``guard.unheard_us``, see ``Unheard``.
         """
-        if self._unheard is None or not self._ids:
-            return inf
-        age, here = self._extrapolated(now)
-        return self._unheard.pace(now, age, here, place, towards)
+        bounds = self.bounds(now, place)
+        return inf if bounds is None else bounds.along(towards)
 
-    def confine(self, now: int, place: Array, speed: float) -> bool:
-        """Return whether a vehicle at ``place`` (3,), m, must be slow because of neighbours that are unheard.
+    def bounds(self, now: int, place: Array) -> SpeedBounds | None:
+        """Return the bounds on the speed of a vehicle at ``place`` (3,), m, beside unheard neighbours.
 
-        ``speed`` (m/s): its present one, see ``Unheard``.
+        Returns None if there is none, or without ``guard.unheard_us``, see ``Unheard``.
         """
         if self._unheard is None or not self._ids:
-            return False
-        age, here = self._extrapolated(now)
-        return self._unheard.confined(now, age, here, place, speed)
-
-    def _extrapolated(self, now: int) -> tuple[Ages, Array]:
-        """Return age (M,), µs, and extrapolated position (M, 3), m, of all neighbours."""
+            return None
         self._update_rows()
-        age, here = now - self._times, np.empty((len(self._ids), 3))
-        extrapolate(self._states, age, self._config.neighbour.extrapolate_us, here)
-        return age, here
+        return self._unheard.bounds(now, self._heard(now), place)
+
+    def _heard(self, now: int) -> Heard:
+        """Return what was heard last of all neighbours: a state, or the beginning of a plan."""
+        ages, states = now - self._times, self._states.copy()
+        begun, starts = self._table.starts(self._ids)
+        # A plan counts if its sender can have come there since its last position.
+        flown = 1e-6 * np.maximum(begun - self._times, 0) * hypot(*self._config.limits.v_max)
+        planned = (begun > self._times) & (begun <= now)
+        planned &= within(starts[:, 0:3], states[:, 0:3], _MAX_PLAN_DEVIATION + flown)
+        ages[planned], states[planned] = now - begun[planned], starts[planned]
+        return Heard(ages, states, planned)
 
     def nearest(self, now: int, own: State | None) -> tuple[int, float] | None:
         """Return system id and distance (m) of the neighbour nearest to the ``own`` position.

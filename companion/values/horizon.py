@@ -189,6 +189,18 @@ class HorizonTable:
         after = np.where(known, times - heads[:, 0], _NO_PLAN_US)
         return Located(positions[:, 0], after, heads[:, 1])
 
+    def starts(self, senders: Sequence[int]) -> tuple[NDArray[np.int64], Array]:
+        """Return when (M,), µs, the horizons of ``senders`` begin, and their first states (M, 6).
+
+        The time is far in the past for those without a horizon, and the state zero.
+        """
+        rows = self._rows_of(senders)
+        if not self._rows:
+            return np.full(len(senders), -_NO_PLAN_US), np.zeros((len(senders), 6))
+        known, heads = rows >= 0, self._heads[rows]
+        states = np.where(known[:, None], STORE.knots[heads[:, 3], 0, 0:6], 0.0)
+        return np.where(known, heads[:, 0], -_NO_PLAN_US), states
+
     def accelerations(self, senders: Sequence[int], times: NDArray[np.int64]) -> Array:
         """Return the planned accelerations (M, 3), m/s², of ``senders`` (M,).
 

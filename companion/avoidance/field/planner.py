@@ -22,6 +22,7 @@ from companion.obstacles.static import FIRST_ID
 from companion.surfaces import Surface
 from companion.values.horizon import Array, Horizon, roll_out
 from companion.values.obstacles import Obstacles
+from companion.values.speed_bounds import Slowing, SpeedBounds
 
 _ZERO = np.zeros(3)
 _ZERO.flags.writeable = False
@@ -93,17 +94,7 @@ class Planner:
         self.dqmpc = Dqmpc(self.config.horizon, self.config.cost, limits)
         flown_us = self.config.guard.hold_us + self.config.rates.replan_us
         self._walls = Walls(limits, self.dqmpc.dt, 1e-6 * flown_us)
-        self._fast = self.dqmpc, self._walls
-        self._slow = None
-        if self.config.guard.unheard_us is not None:
-            speed = self.config.guard.unheard_speed
-            slower = limits.model_copy(update={"v_max": tuple(min(v, speed) for v in limits.v_max)})
-            dqmpc = Dqmpc(self.config.horizon, self.config.cost, slower)
-            self._slow = dqmpc, Walls(slower, dqmpc.dt, 1e-6 * flown_us)
-
-    def confine(self, *, slow: bool) -> None:
-        """Plan with at most ``guard.unheard_speed`` on each axis, or again as fast as the limits allow."""
-        self.dqmpc, self._walls = self._fast if self._slow is None or not slow else self._slow
+        self._slowing = Slowing(self.dqmpc.dt, limits.a_total, limits.j_max)
 
     def plan(
         self,
@@ -114,11 +105,13 @@ class Planner:
         aim: Aim,
         obstacles: Obstacles,
         acceleration: Array = _ZERO,
+        bounds: SpeedBounds | None = None,
     ) -> Plan:
         """Return a plan from the state at ``now`` (µs).
 
         ``acceleration`` (3,), m/s², is flown until then. ``prediction`` (N + 1, 3), m, is the previous plan
-        at n = 0…N. Raises SolverError when there is no solution: the caller keeps the plan that it has.
+        at n = 0…N. ``bounds``: what its speed keeps beside unheard neighbours. Raises SolverError when there
+        is no solution: the caller keeps the plan that it has.
         """
         to_go = aim.destination - (aim.target_end - aim.target) - position
         scene = Scene(
@@ -146,6 +139,8 @@ class Planner:
             None if self.config.limits.j_max is None else Flown(acceleration, elapsed),
         )
         solution = self.dqmpc.solve(problem, influence.omega_scale)
+        if bounds is not None:
+            self._slowing.keep(position, velocity, acceleration, elapsed, bounds, solution.acceleration)
         self._walls.keep(position, velocity, acceleration, elapsed, solution.acceleration)
         horizon = roll_out(now, self.config.horizon.dt_us, position, velocity, solution.acceleration)
         end = horizon.knots[-1]

@@ -111,9 +111,8 @@ class Surroundings:
         """Return ∞: the caller says where the neighbours are, so none is unheard."""
         return inf
 
-    def confine(self, _now: int, _place: Array, _speed: float) -> bool:
-        """Return False: no neighbour is unheard."""
-        return False
+    def bounds(self, _now: int, _place: Array) -> None:
+        """Return None: no neighbour is unheard."""
 
     def mates(self, now: int) -> Mates:
         """Return the neighbours that share a plan which is not too old."""
