@@ -19,10 +19,13 @@ _PORTS: Final = range(16_000, 28_000)
 
 class Sitl:
     """Vehicles of one flavour, from ``start`` until the end of the context; ``shared``: a UDP port of this
-    machine to which all of them speak as well. ``base`` is known before they are up."""
+    machine to which all of them speak as well. ``base`` is known before they are up; ``options`` are more of
+    the command."""
 
-    def __init__(self, flavour: str, count: int, *, speedup: float = 1.0) -> None:
-        self.flavour, self.count, self.speedup = flavour, count, speedup
+    def __init__(
+        self, flavour: str, count: int, *, speedup: float = 1.0, options: tuple[str, ...] = ()
+    ) -> None:
+        self.flavour, self.count, self.speedup, self.options = flavour, count, speedup, options
         self.base, self.shared = _free_ports(flavour, count)
         self.vehicles: list[dict[str, Any]] = []
         self._process: subprocess.Popen[str] | None = None
@@ -30,7 +33,7 @@ class Sitl:
     def start(self) -> Sitl:
         """Returns when all vehicles are up. Fails with what it said."""
         command = [sys.executable, "-m", "outrider", "sitl", "--json", f"--flavour={self.flavour}"]
-        command += [f"--count={self.count}", f"--speedup={self.speedup}", f"--port-base={self.base}"]
+        command += [f"--count={self.count}", f"--speedup={self.speedup}", f"--port-base={self.base}", *self.options]
         if self.flavour == "ardupilot":
             command.append(f"--to=udpout:127.0.0.1:{self.shared}")
         self._process = process = subprocess.Popen(

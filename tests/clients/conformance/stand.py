@@ -85,9 +85,10 @@ class Stand(Client):
 
         ``send`` makes a message that is sent at 20 Hz; ``watch`` is called at the same rate.
         """
-        for step in range(round(seconds * 20)):
+        since = self.rig.now
+        while self.rig.now - since < 1e6 * seconds:
             if holds():
-                return step / 20
+                return 1e-6 * (self.rig.now - since)
             if send is not None:
                 self.send(send())
             self.wait(0.05 if send is None else 0.04)
@@ -106,18 +107,20 @@ class Stand(Client):
 
         This is what ``minimum_duration`` means in the waits of ArduPilot's suite.
         """
-        since = 0
+        since = self.rig.now
 
         def lasts() -> bool:
             nonlocal since
-            since = since + 1 if holds() else 0
-            return since > duration * 20
+            if not holds():
+                since = self.rig.now
+            return self.rig.now - since > 1e6 * duration
 
         self.until(lasts, seconds, send)
 
     def stays(self, holds: Callable[[], bool], seconds: float, send: Callable[[], Any] | None = None) -> None:
         """Fail unless ``holds`` for ``seconds``."""
-        for _ in range(round(seconds * 20)):
+        since = self.rig.now
+        while self.rig.now - since < 1e6 * seconds:
             if send is not None:
                 self.send(send())
             self.wait(0.05 if send is None else 0.04)
