@@ -106,7 +106,8 @@ def _write_allowed(gaps: Array, braking: float, time: float, found: Array) -> No
 @part
 def _closing(normals: Array, j: int, velocity: Array) -> float:
     """Return the speed (m/s) towards place ``j``."""
-    return normals[j, 0] * velocity[0] + normals[j, 1] * velocity[1] + normals[j, 2] * velocity[2]
+    speed: float = normals[j, 0] * velocity[0] + normals[j, 1] * velocity[1] + normals[j, 2] * velocity[2]
+    return speed
 
 
 @kernel(VOID, *[array(1)] * 4, array(2), *[array(1)] * 3, *[FLOAT] * 5, output(2))

@@ -33,7 +33,12 @@ class Sitl:
     def start(self) -> Sitl:
         """Returns when all vehicles are up. Fails with what it said."""
         command = [sys.executable, "-m", "outrider", "sitl", "--json", f"--flavour={self.flavour}"]
-        command += [f"--count={self.count}", f"--speedup={self.speedup}", f"--port-base={self.base}", *self.options]
+        command += [
+            f"--count={self.count}",
+            f"--speedup={self.speedup}",
+            f"--port-base={self.base}",
+            *self.options,
+        ]
         if self.flavour == "ardupilot":
             command.append(f"--to=udpout:127.0.0.1:{self.shared}")
         self._process = process = subprocess.Popen(
