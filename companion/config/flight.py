@@ -59,21 +59,20 @@ class GuardConfig(Settings):
     )
     unheard_us: Micros | None = Field(
         None,
-        description="µs: a vehicle slows down near a neighbour that has lately been silent for longer, and"
-        " the distances to it grow (field); null: it does not",
+        description="µs: a vehicle flies slower the nearer a neighbour may be that has lately been silent for"
+        " longer, and the distances to it grow (field); null: it does not",
     )
     unheard_speed: Positive = Field(
         1.0,
-        description="m/s: a vehicle near an unheard neighbour is no faster on each axis, and the distances to"
-        " that neighbour grow at this rate, until neighbour_lost_us",
+        description="m/s: the field's distances to an unheard neighbour grow at this rate, until"
+        " neighbour_lost_us; and at least this speed is allowed beside one that counts as gone",
     )
     unheard_wait_us: int = Field(
         15_000_000,
         ge=0,
         le=600_000_000,
-        description="µs: with unheard_us a vehicle does not approach the places that a neighbour may have"
-        " reached at unheard_speed since it was heard, until it has been silent for longer; then it counts as"
-        " gone",
+        description="µs: with unheard_us a vehicle keeps clear of all places that a neighbour may have reached"
+        " since it was heard, until it has been silent for longer; then it counts as gone",
     )
     late_us: Micros = Field(100_000, description="µs: a step that is later is a missed deadline")
     battery_low: float = Field(
