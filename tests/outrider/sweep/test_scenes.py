@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from companion.config.obstacles import Box
 from companion.obstacles.static import FixedObstacles
 from outrider.errors import InputError
 from outrider.resources import config_root
@@ -56,6 +57,7 @@ SCENES = st.builds(
     posts=st.none()
     | st.fixed_dictionaries({"per_vehicle": dial(0.0, 1.0), "radius": spans(0.1, 1.0)})
     | st.fixed_dictionaries({"count": st.tuples(st.integers(0, 6), st.integers(0, 6)).map(sorted)}),
+    boxes=st.none() | st.fixed_dictionaries({"per_vehicle": dial(0.0, 1.0), "size": spans(0.2, 3.0)}),
 )
 
 
@@ -104,13 +106,29 @@ def test_places_keep_apart_and_clear(which: Scene, seed: int) -> None:
         # The companion's own geometry, from any height: seen from above is the least.
         assert FixedObstacles(flown.obstacles).distance(places).min() >= which.clear - 1e-9
         across = np.array([o.at[:2] for o in flown.obstacles])
-        radii = np.array([o.radius for o in flown.obstacles])
+        radii = np.array(
+            [0.5 * np.hypot(*o.size[:2]) if isinstance(o, Box) else o.radius for o in flown.obstacles]
+        )
         off = np.linalg.norm(across[:, None] - across[None], axis=-1) - radii[:, None] - radii[None]
         np.fill_diagonal(off, np.inf)
         assert off.min() >= which.gap - 1e-9
     low, high = np.array(flown.companion.limits.box_min), np.array(flown.companion.limits.box_max)
     assert (places > low).all()
     assert (places < high).all()
+
+
+def test_boxes_leave_the_other_obstacles_of_a_seed_as_they_are_and_stand_on_the_ground() -> None:
+    plain = drawn(scene("clutter"), 3).obstacles
+    blocks = {"count": [4, 4], "size": [0.5, 1.0], "height": [2.0, 3.0]}
+    found = drawn(scene("clutter", boxes=blocks), 3).obstacles
+    assert found[: len(plain)] == plain
+    boxes = [one for one in found[len(plain) :] if isinstance(one, Box)]
+    assert len(boxes) == 4 == len(found) - len(plain)
+    for one in boxes:
+        assert one.at[2] == 0.5 * one.size[2]
+        assert 0.5 <= min(one.size[:2]) <= max(one.size[:2]) <= 1.0
+        assert 2.0 <= one.size[2] <= 3.0
+    assert len({one.yaw_deg for one in boxes}) == 4
 
 
 @settings(max_examples=40)
@@ -154,6 +172,7 @@ def test_the_dial_turns_one_way(which: Scene, one: float, other: float, count: i
     assert hard.speed >= easy.speed
     assert hard.spheres >= easy.spheres
     assert hard.posts >= easy.posts
+    assert hard.boxes >= easy.boxes
     assert hard.jumps >= easy.jumps
     assert hard.length >= easy.length
     assert hard.every_s <= easy.every_s
@@ -221,6 +240,7 @@ def test_the_rest_of_the_scenario_is_the_file_s() -> None:
         ({"density": {"easy": 4.0, "hard": 4.0}, "vehicles": [60, 60], "apart": 6.0}, "start"),
         ({"posts": {"per_vehicle": {"easy": 30, "hard": 30}}, "vehicles": [8, 8]}, "post"),
         ({"clear": 50.0}, "sphere 1 of"),
+        ({"boxes": {"count": [30, 30], "size": [9.0, 9.0]}, "vehicles": [2, 2]}, "box"),
     ],
 )
 def test_what_cannot_be_placed_is_refused_with_a_sentence(changes: dict[str, Any], said: str) -> None:
@@ -245,6 +265,7 @@ def test_what_cannot_be_placed_is_refused_with_a_sentence(changes: dict[str, Any
         ("posts: {per_vehicle: {easy: 0.0, hard: 1.0}, raidus: [1.0, 1.0]}\n", "did you mean 'radius'?"),
         ("posts: {per_vehicle: {easy: 0.0, hard: 1.0}, radius: [2.0, 1.0]}\n", "posts.radius: the second"),
         ("posts: {count: [2, 1]}\n", "posts.count: the second"),
+        ("boxes: {count: [0, 1], size: [2.0, 1.0]}\n", "boxes.size: the second"),
         ("posts: {radius: [0.2, 0.6]}\n", "per_vehicle or count"),
         ("posts: {count: [0, 1], per_vehicle: {easy: 0.0, hard: 1.0}}\n", "per_vehicle or count"),
     ],

@@ -35,6 +35,7 @@ class SceneParameters(NamedTuple):
     speed: float
     spheres: int
     posts: int
+    boxes: int
     jumps: int
     length: float
     every_s: float
@@ -70,6 +71,7 @@ def scene_parameters(scene: Scene, count: int, seed: int) -> SceneParameters:
         speed=round(at(scene.speed.easy, scene.speed.hard), 3),
         spheres=many(scene.spheres),
         posts=many(scene.posts),
+        boxes=many(scene.boxes),
         jumps=0 if jumps is None else max(1, round(at(jumps.count.easy, jumps.count.hard))),
         length=0.0 if jumps is None else at(jumps.length.easy, jumps.length.hard),
         every_s=0.0 if jumps is None else round(at(jumps.every_s.easy, jumps.every_s.hard), 3),
@@ -116,8 +118,9 @@ def draw(scene: Scene, seed: int) -> dict[str, JsonValue]:
         "at": starts.tolist(),
         "goals": None if goals is None else goals.tolist(),
     }
+    counts = dial.spheres, dial.posts, dial.boxes
     document["obstacles"] = obstacles(
-        stream(seed, Stream.SCENE_OBSTACLES), scene, (dial.spheres, dial.posts), extent, kept, where
+        stream(seed, Stream.SCENE_OBSTACLES), scene, counts, extent, kept, where
     )
     reach = round(extent + radius + _MARGIN, 3)
     companion["limits"] = {

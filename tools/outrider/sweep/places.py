@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from outrider.errors import InputError
-from outrider.sweep.scenes import Scene
+from outrider.sweep.scenes import Blocks, Scene
 
 Array = NDArray[np.float64]
 
@@ -77,25 +77,30 @@ def walk(random: np.random.Generator, jumps: int, length: float, extent: float) 
 def obstacles(
     random: np.random.Generator,
     scene: Scene,
-    counts: tuple[int, int],
+    counts: tuple[int, int, int],
     extent: float,
     kept: Sequence[Circles],
     where: str,
 ) -> list[JsonValue]:
-    """Return ``counts[0]`` spheres, then ``counts[1]`` posts, as in a scenario file.
+    """Return ``counts[0]`` spheres, then ``counts[1]`` posts and ``counts[2]`` boxes, as in a scenario file.
 
     Their centres are in a square of ± ``extent`` m. Horizontally, each surface is at least ``scene.clear``
-    (m) from the circles in ``kept`` and ``scene.gap`` (m) from other obstacles. Raises InputError if there is
-    no room.
+    (m) from the circles in ``kept`` and ``scene.gap`` (m) from other obstacles, where the circle about a box
+    counts. Raises InputError if there is no room.
     """
     placed = np.empty((0, 3))
     found: list[JsonValue] = []
-    kinds = ((scene.spheres, counts[0], "sphere"), (scene.posts, counts[1], "post"))
+    kinds = zip((scene.spheres, scene.posts, scene.boxes), counts, ("sphere", "post", "box"), strict=True)
     for kind, count, word in kinds:
         if kind is None:
             continue
         for k in range(count):
-            radius = float(_mm(random.uniform(*kind.radius)))
+            edges: list[float] = []
+            if isinstance(kind, Blocks):
+                edges = _mm(random.uniform(*kind.size, size=2)).tolist()
+                radius = 0.5 * math.hypot(*edges)
+            else:
+                radius = float(_mm(random.uniform(*kind.radius)))
             height = float(_mm(random.uniform(*kind.height)))
             place = _free(random, radius, extent, scene, kept, placed)
             if place is None:
@@ -106,11 +111,14 @@ def obstacles(
                 )
             placed = np.vstack([placed, [*place, radius]])
             x, y = place.tolist()
-            found.append(
-                {"kind": "sphere", "at": [x, y, height], "radius": radius}
-                if word == "sphere"
-                else {"kind": "post", "at": [x, y], "radius": radius, "height": height}
-            )
+            if word == "sphere":
+                found.append({"kind": "sphere", "at": [x, y, height], "radius": radius})
+            elif word == "post":
+                found.append({"kind": "post", "at": [x, y], "radius": radius, "height": height})
+            else:
+                yaw = float(_mm(random.uniform(0.0, 180.0)))
+                size: list[JsonValue] = [*edges, height]
+                found.append({"kind": "box", "at": [x, y, 0.5 * height], "size": size, "yaw_deg": yaw})
     return found
 
 

@@ -104,6 +104,13 @@ class Poles(Things):
     height: Span = Field((8.0, 20.0), description="m above ground, of the tops")
 
 
+class Blocks(Things):
+    """Boxes on the ground, turned at random."""
+
+    size: Span = Field((0.5, 3.0), description="m, of each horizontal edge")
+    height: Span = Field((2.0, 12.0), description="m above ground, of the tops")
+
+
 class Jumps(Part):
     """Jumps of the target to other positions, several times; the first jump is at the goal event."""
 
@@ -137,6 +144,7 @@ class Scene(Part):
     gap: float = Field(3.0, ge=0.0, le=50.0, description="m between the surfaces of obstacles")
     spheres: Balls | None = None
     posts: Poles | None = None
+    boxes: Blocks | None = None
     jumps: Jumps | None = Field(None, description="of the target, in an escort")
     trouble: Trouble | None = Field(None, description="random disturbances")
     scenario: dict[str, JsonValue] = Field({}, description="other values of the drawn scenarios")
@@ -148,13 +156,14 @@ class Scene(Part):
             ("speed", self.speed),
         ]
         spans: list[tuple[str, tuple[float, float]]] = [("vehicles", self.vehicles), ("height", self.height)]
-        for name, kind in (("spheres", self.spheres), ("posts", self.posts)):
+        for name, kind in (("spheres", self.spheres), ("posts", self.posts), ("boxes", self.boxes)):
             if kind is not None:
                 if kind.per_vehicle is not None:
                     scene_parameters.append((f"{name}.per_vehicle", kind.per_vehicle))
                 if kind.count is not None:
                     spans.append((f"{name}.count", kind.count))
-                spans += [(f"{name}.radius", kind.radius), (f"{name}.height", kind.height)]
+                width = ("size", kind.size) if isinstance(kind, Blocks) else ("radius", kind.radius)
+                spans += [(f"{name}.{one}", span) for one, span in (width, ("height", kind.height))]
         if self.jumps is not None:
             scene_parameters += [("jumps.count", self.jumps.count), ("jumps.length", self.jumps.length)]
             if self.jumps.every_s.hard > self.jumps.every_s.easy:
