@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.values.components import COMPONENT
+from mavlink_bridge.links.endpoints import parse_endpoint
 from mavlink_bridge.links.link import LinkCounters
 from mavlink_bridge.loops.lockstep import Direction
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Source, Tunnel
@@ -32,6 +33,7 @@ from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
 from outrider.view.listener import Listener
 from outrider.view.live import Begin, LiveSource, packed
+from outrider.view.missing_peers import MissingPeers
 from outrider.view.player import Player, load
 from tests.outrider.report.runs import WrittenRun, leave
 from tests.outrider.said import Run
@@ -131,6 +133,63 @@ def test_what_is_no_run_is_said_in_one_line(tmp_path: Path, run: Run) -> None:
         assert said in ended.err
 
 
+class Receiver:
+    """A link on which things arrive, and nothing may be sent."""
+
+    def __init__(self) -> None:
+        self.arrived: list[bytes] = []
+
+    counters = LinkCounters(0, 0, 0)
+
+    def fileno(self) -> None:
+        return None
+
+    def receive(self) -> list[bytes]:
+        found, self.arrived = self.arrived, []
+        return found
+
+    def send(self, data: bytes) -> None:
+        raise AssertionError("a view sends nothing")
+
+    def close(self) -> None:
+        pass
+
+
+class Caller(Receiver):
+    """A link that has no peer for a reason."""
+
+    failure = ""
+
+
+def test_why_a_link_has_no_peer_is_said_once_for_each_reason(capsys: pytest.CaptureFixture[str]) -> None:
+    called, heard = Caller(), Receiver()
+    missing = MissingPeers(
+        [parse_endpoint("tcp:127.0.0.1:9"), parse_endpoint("udpin:127.0.0.1:8")], [called, heard]
+    )
+    said = []
+    for failure in (
+        "",
+        "Connection refused",
+        "Connection refused",
+        "No route to host",
+        "",
+        "Connection refused",
+    ):
+        called.failure = failure
+        missing.say()
+        said.append(capsys.readouterr().err)
+    place = "outrider view: tcp:127.0.0.1:9: no connection: "
+    again = "; it is tried again every second\n"
+    refused, no_route = f"{place}Connection refused{again}", f"{place}No route to host{again}"
+    assert said == ["", refused, "", no_route, "", refused]
+
+
+def test_a_view_of_a_port_where_nobody_listens_says_so(run: Run) -> None:
+    ended = run("view", "tcp:127.0.0.1:9", "--seconds", "0.5")
+    assert ended.status == 0
+    assert ended.err.count("tcp:127.0.0.1:9: no connection: Connection refused") == 1
+
+
 def test_without_the_extra_it_says_what_to_install(
     run: Run, monkeypatch: pytest.MonkeyPatch, made: WrittenRun
 ) -> None:
@@ -157,28 +216,6 @@ def test_a_run_becomes_one_file(run: Run, made: WrittenRun, tmp_path: Path) -> N
     again = run("view", str(made.directory), "--html", str(page))
     assert again.status == 2
     assert "is there already" in again.err
-
-
-class Receiver:
-    """A link on which things arrive, and nothing may be sent."""
-
-    def __init__(self) -> None:
-        self.arrived: list[bytes] = []
-
-    counters = LinkCounters(0, 0, 0)
-
-    def fileno(self) -> None:
-        return None
-
-    def receive(self) -> list[bytes]:
-        found, self.arrived = self.arrived, []
-        return found
-
-    def send(self, data: bytes) -> None:
-        raise AssertionError("a view sends nothing")
-
-    def close(self) -> None:
-        pass
 
 
 class Overhears:

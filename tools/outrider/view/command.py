@@ -23,6 +23,7 @@ from outrider.interruption import noted
 from outrider.scenarios.scenario import TARGET_SYSTEM
 from outrider.terminal.share_progress import share_progress
 from outrider.view.listener import Listener
+from outrider.view.missing_peers import MissingPeers
 from outrider.view.page_document import recorded_page
 from outrider.view.page_server import PageServer
 from outrider.view.player import Player, load
@@ -63,10 +64,11 @@ def view(sources: Sequence[str], terms: Terms) -> int:
             f"--html {terms.html}: only a finished run can be written to a file; allowed: a run directory"
         )
     with ExitStack() as opened:
-        return _serve(_listening(sources, terms, opened), terms, "listens, and sends nothing:")
+        listener, missing = _listening(sources, terms, opened)
+        return _serve(listener, terms, "listens, and sends nothing:", missing.say)
 
 
-def _listening(sources: Sequence[str], terms: Terms, opened: ExitStack) -> Listener:
+def _listening(sources: Sequence[str], terms: Terms, opened: ExitStack) -> tuple[Listener, MissingPeers]:
     clock = WallClock()
     places, links = [], []
     for text in sources:
@@ -83,14 +85,16 @@ def _listening(sources: Sequence[str], terms: Terms, opened: ExitStack) -> Liste
         places.append(place)
         links.append(link)
     hint = f"Listening at {', '.join(map(str, places))}; nothing is sent. (ArduPilot waits for requests.)"
-    return Listener(links, [_whole(place) for place in places], terms.target, hint)
+    listener = Listener(links, [_whole(place) for place in places], terms.target, hint)
+    return listener, MissingPeers(places, links)
 
 
 def _whole(place: Endpoint) -> bool:
     return isinstance(place, UdpIn | Multicast)
 
 
-def _serve(source: Source, terms: Terms, does: str) -> int:
+def _serve(source: Source, terms: Terms, does: str, each_time: Callable[[], None] = lambda: None) -> int:
+    """Serve the page of ``source``; ``each_time`` is called once for each picture."""
     with _quiet(), noted((signal.SIGINT, signal.SIGTERM)) as stopped:
         try:
             page_server = PageServer(terms.host, terms.port)
@@ -98,7 +102,12 @@ def _serve(source: Source, terms: Terms, does: str) -> int:
             raise InputError(f"--host {terms.host}, --port {terms.port}: {error.strerror or error}") from None
         sys.stderr.write(f"outrider view {does} {page_server.url} shows it; Ctrl-C ends it\n")
         until = None if terms.seconds is None else time.monotonic() + terms.seconds
-        page_server.run(source, lambda: bool(stopped) or (until is not None and time.monotonic() > until))
+
+        def over() -> bool:
+            each_time()
+            return bool(stopped) or (until is not None and time.monotonic() > until)
+
+        page_server.run(source, over)
         page_server.stop()
     return 0
 
