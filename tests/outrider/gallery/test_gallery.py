@@ -54,7 +54,7 @@ def test_the_page_shows_all_and_says_what_became_of_each(here: Path) -> None:
     assert "| 7.2 s, least 1.50 m | 7.2 s, least 1.50 m | 7.2 s, least 0.40 m, 1 violation |" in text
     assert "Four vehicles change lanes between posts and spheres." in text
     for name in ("traffic", "obstacles"):
-        assert f"![{name}]({name}.png)" in text
+        assert f"[![{name}]({name}.png)]({name}.png)" in text
         assert (here / "page" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert (here / "runs" / "sweep-gallery" / "journal.jsonl").is_file()
 
