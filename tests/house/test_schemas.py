@@ -37,6 +37,27 @@ def test_an_unknown_key_is_an_error_everywhere(name: str, model: type[BaseModel]
         assert node.get("additionalProperties") is False, node.get("title")
 
 
+def explained(node: dict[str, Any], definitions: dict[str, Any]) -> bool:
+    """Whether an editor shows what a key means: its description, that of its model, or its only value."""
+    if "description" in node or "const" in node:
+        return True
+    inner = [node, *node.get("anyOf", []), node.get("items", {})]
+    models = [str(one["$ref"]).rpartition("/")[2] for one in inner if "$ref" in one]
+    return any("description" in definitions[name] for name in models)
+
+
+@pytest.mark.parametrize(("name", "model"), SCHEMAS)
+def test_every_key_is_explained(name: str, model: type[BaseModel]) -> None:
+    whole = schema(model)
+    unexplained = [
+        f"{node.get('title')}.{key}"
+        for node in objects(whole)
+        for key, value in node["properties"].items()
+        if not explained(value, whole.get("$defs", {}))
+    ]
+    assert unexplained == []
+
+
 def test_there_is_no_schema_without_a_model() -> None:
     assert {path.stem for path in FOLDER.glob("*.json")} == {name for name, _ in SCHEMAS}
 

@@ -24,7 +24,7 @@ class Measure(Part):
     ball: ‖Δ‖; box: the largest of |Δx|, |Δy|, |Δz|; ellipsoid: ‖(Δx, Δy, Δz / downwash)‖.
     """
 
-    kind: Literal["ball", "box", "ellipsoid"] = "ball"
+    kind: Literal["ball", "box", "ellipsoid"] = Field("ball", description="shape of a vehicle: see above")
     least: Length = Field(description="m in that measure; less is a collision")
     downwash: float = Field(1.0, ge=1.0, le=20.0, description="of an ellipsoid: height over width")
     obstacle: Length | None = Field(
@@ -79,7 +79,7 @@ class Row(Part):
 class Published(Part):
     """Published figures of one planner in one row; those that were not published are null."""
 
-    planner: Text
+    planner: Text = Field(description="name of the planner")
     row: Text = Field(description="label of a row of this file")
     success: Share | None = Field(None, description="share of the flights without a collision that arrive")
     mean_s: Figure | None = Field(None, description="s, mean time")
@@ -92,14 +92,14 @@ class Published(Part):
     plan_ms: Figure | None = Field(None, description="ms, time of a plan")
     runs: int | None = Field(None, ge=1, description="number of flights")
     source: Text = Field(description="where it was published, or read")
-    note: str = Field("", max_length=400)
+    note: str = Field("", max_length=400, description="what to know of these figures")
 
 
 class Comparison(Part):
     """Scene of a published planner."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
-    description: Text
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$", description="names the output directory")
+    description: Text = Field(description="one line for lists and reports")
     scenario: Text = Field(description="scenario file, beside this one")
     measure: Measure
     goal_radius: Length = Field(

@@ -28,12 +28,14 @@ class Sweep(Part):
     is and with each of the values to vary.
     """
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
-    description: str = ""
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$", description="names the output directory")
+    description: str = Field("", description="one line for lists and reports")
     scenarios: tuple[Name, ...] = Field((), description="files, or names of shipped scenarios")
     scenes: tuple[Name, ...] = Field((), description="or scenes, of which every seed draws another scenario")
     runs: int = Field(100, ge=1, le=1_000_000, description="seeds of every cell")
-    first_seed: int = Field(1, ge=0, le=1_000_000_000)
+    first_seed: int = Field(
+        1, ge=0, le=1_000_000_000, description="first seed of every cell; the others follow it"
+    )
     set: dict[Key, JsonValue] = Field(
         {}, description="values for all cells by dotted key: companion.planar: true"
     )

@@ -36,43 +36,43 @@ DECIDED = (
 class Density(Part):
     """Vehicles for each 100 m² of the square in which they start."""
 
-    easy: float = Field(gt=0.0, le=4.0)
-    hard: float = Field(gt=0.0, le=4.0)
+    easy: float = Field(gt=0.0, le=4.0, description="1/(100 m²), value at difficulty 0")
+    hard: float = Field(gt=0.0, le=4.0, description="1/(100 m²), value at difficulty 1")
 
 
 class Speed(Part):
     """Largest speed along each axis, m/s."""
 
-    easy: float = Field(ge=0.5, le=9.0)
-    hard: float = Field(ge=0.5, le=9.0)
+    easy: float = Field(ge=0.5, le=9.0, description="m/s, value at difficulty 0")
+    hard: float = Field(ge=0.5, le=9.0, description="m/s, value at difficulty 1")
 
 
 class PerVehicle(Part):
     """Number for each vehicle; the total is rounded."""
 
-    easy: Amount
-    hard: Amount
+    easy: Amount = Field(description="value at difficulty 0")
+    hard: Amount = Field(description="value at difficulty 1")
 
 
 class Count(Part):
     """Number, rounded."""
 
-    easy: Amount
-    hard: Amount
+    easy: Amount = Field(description="value at difficulty 0")
+    hard: Amount = Field(description="value at difficulty 1")
 
 
 class Distance(Part):
     """Distance, m."""
 
-    easy: Metres
-    hard: Metres
+    easy: Metres = Field(description="m, value at difficulty 0")
+    hard: Metres = Field(description="m, value at difficulty 1")
 
 
 class Interval(Part):
     """Interval, s; the hard value is the shorter one."""
 
-    easy: float = Field(gt=0.0, le=600.0)
-    hard: float = Field(gt=0.0, le=600.0)
+    easy: float = Field(gt=0.0, le=600.0, description="s, value at difficulty 0")
+    hard: float = Field(gt=0.0, le=600.0, description="s, value at difficulty 1")
 
 
 class Things(Part):
@@ -93,14 +93,14 @@ class Things(Part):
 class Balls(Things):
     """Spheres in the air."""
 
-    radius: Span = (0.5, 1.5)
+    radius: Span = Field((0.5, 1.5), description="m; drawn uniformly")
     height: Span = Field((3.0, 8.0), description="m above ground, of the centres")
 
 
 class Poles(Things):
     """Posts on the ground."""
 
-    radius: Span = (0.2, 0.6)
+    radius: Span = Field((0.2, 0.6), description="m; drawn uniformly")
     height: Span = Field((8.0, 20.0), description="m above ground, of the tops")
 
 
@@ -125,8 +125,10 @@ class Scene(Part):
     All distances between positions are horizontal, so that take-off and landing are as clear as the flight.
     """
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,50}$")
-    description: str = ""
+    name: str = Field(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,50}$", description="names the drawn scenarios, with the seed"
+    )
+    description: str = Field("", description="one line for lists and reports")
     task: Literal["goto", "escort"] = Field(
         description="goto: each vehicle flies to its own goal; escort: of a target that jumps"
     )

@@ -27,11 +27,19 @@ class Trouble(Part):
     sensors: tuple[Literal["truth", "rtk", "gnss", "sih"], ...] = Field(
         ("rtk",), min_length=1, description="one of"
     )
-    loss: tuple[Share, Share] = (0.0, 0.0)
-    delay_ms: tuple[Milliseconds, Milliseconds] = (20.0, 20.0)
-    jitter_ms: tuple[Milliseconds, Milliseconds] = (0.0, 0.0)
-    duplication: tuple[Share, Share] = (0.0, 0.0)
-    reordering: tuple[Share, Share] = (0.0, 0.0)
+    loss: tuple[Share, Share] = Field(
+        (0.0, 0.0), description="share of the messages of the swarm link that are lost"
+    )
+    delay_ms: tuple[Milliseconds, Milliseconds] = Field((20.0, 20.0), description="ms, of every message")
+    jitter_ms: tuple[Milliseconds, Milliseconds] = Field(
+        (0.0, 0.0), description="ms, largest additional delay of a message"
+    )
+    duplication: tuple[Share, Share] = Field(
+        (0.0, 0.0), description="share of the messages that arrive twice"
+    )
+    reordering: tuple[Share, Share] = Field(
+        (0.0, 0.0), description="share of the messages that later ones overtake"
+    )
     wind: Annotated[float, Field(ge=0.0, le=20.0)] = Field(
         0.0, description="largest speed, m/s; any direction"
     )
@@ -56,7 +64,7 @@ class Trouble(Part):
     within_s: Seconds = Field(
         8.0, description="latest start of a fault after the goal event; longest pause before a partition"
     )
-    for_s: tuple[Seconds, Seconds] = (0.5, 4.0)
+    for_s: tuple[Seconds, Seconds] = Field((0.5, 4.0), description="s, duration of each partition and fault")
 
     @model_validator(mode="after")
     def _order(self) -> Self:
