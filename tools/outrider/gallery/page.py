@@ -18,8 +18,8 @@ distance of any two vehicles, and d_min in red; for escorts also the distance fr
 target: a line for its median, a band up to its largest. All panels of a row have the same axes. One flight is
 a picture, no measurement: for figures over many seeds see docs/results.md. A target shares no plan and gives
 way to no vehicle: separation from it is not proven. Certified vehicles fly their plans to the end and wait
-there while two clocks differ by more than twice `certified.clock_us`, as in `rough`. A click on a picture opens
-it in full size.
+there while two clocks differ by more than twice `certified.clock_us`, as in `rough`. A click on a picture
+opens it in full size.
 
 `outrider gallery --page docs/gallery` makes this page.
 
