@@ -190,6 +190,20 @@ def test_a_table_locates_each_sender_at_a_time_of_its_own(fleet, unknown, data):
 
 
 @LAWS
+@given(fleet=st.dictionaries(st.integers(1, 250), horizons(), max_size=5))
+def test_a_table_says_when_and_where_each_horizon_begins(fleet):
+    table = HorizonTable(1, 4)
+    for sender, horizon in fleet.items():
+        table.put(sender, horizon)
+    begun, states = table.starts((*fleet, 251))
+    for row, horizon in enumerate(fleet.values()):
+        assert begun[row] == horizon.epoch
+        np.testing.assert_array_equal(states[row], horizon.knots[0, 0:6])
+    assert begun[-1] < -EPOCH
+    assert not states[-1].any()
+
+
+@LAWS
 @given(fleet=st.dictionaries(st.integers(1, 250), horizons(), max_size=5), data=st.data())
 def test_a_table_says_what_each_sender_means_to_accelerate(fleet, data):
     """Before its plan begins, what that begins with; nothing after it, nor of one without a plan."""
