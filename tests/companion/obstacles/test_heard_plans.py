@@ -21,7 +21,7 @@ THERE = np.array([6.0, 0.0, 0.0])
 
 
 def bounds(plan_at: np.ndarray | None, config: CompanionConfig = CONFIG) -> SpeedBounds | None:
-    """After two seconds of silence, in which only a plan that begins at ``plan_at`` came, just before the end.
+    """After two seconds of silence, in which only a plan that begins at ``plan_at`` came, late.
 
     The neighbour hovered ``THERE`` before.
     """
