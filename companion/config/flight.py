@@ -71,8 +71,8 @@ class GuardConfig(Settings):
         15_000_000,
         ge=0,
         le=600_000_000,
-        description="µs: with unheard_us a vehicle keeps clear of all places that a neighbour may have reached"
-        " since it was heard, until it has been silent for longer; then it counts as gone",
+        description="µs: with unheard_us a vehicle keeps clear of all places that a neighbour may have"
+        " reached since it was heard, until it has been silent for longer; then it counts as gone",
     )
     late_us: Micros = Field(100_000, description="µs: a step that is later is a missed deadline")
     battery_low: float = Field(
