@@ -55,6 +55,7 @@ class Unheard:
         self._growth = guard.unheard_speed
         self._d_min = field.d_min + field.margin(2)
         self._scale = np.array([1.0, 1.0, 1.0 / field.downwash])
+        self._planar = config.planar
         self._braking, self._time = min(limits.u_max), _TIME_S
         self._reach = Reach(self._braking, self._time, hypot(*limits.v_max))
         # The longest silence (µs) of each neighbour, as far as it is remembered, at the last call.
@@ -85,6 +86,8 @@ class Unheard:
         gone = ages > self._waits
         reach = np.where(gone, np.minimum(reach, self.radii(ages)), reach)
         normals = off * self._scale / np.maximum(distances, _LEVEL)[:, None]
+        if self._planar:
+            normals[:, 2] = 0.0
         return SpeedBounds(
             place,
             np.ascontiguousarray(normals[unheard]),

@@ -28,7 +28,8 @@ _LEVEL = 1e-9
 class SpeedBounds(NamedTuple):
     """K places that a vehicle at ``place`` (3,), m, must not come near.
 
-    ``normals`` (K, 3): unit vectors towards them; ``gaps`` (K,), m: how far they are along these, at least 0.
+    ``normals`` (K, 3): unit vectors towards them, or the horizontal parts of these for flights at one height;
+    ``gaps`` (K,), m: how far they are along these, at least 0.
     ``floors`` (K,), m/s: speed that is allowed beside each at any gap, other than towards it. ``braking``
     (m/s²) is b and ``time`` (s) is T.
     """
@@ -142,6 +143,7 @@ def _keep(
         for _ in range(_ROUNDS):
             for j in range(len(gaps)):
                 over = max(_closing(normals, j, w) - towards[j], 0.0)
+                over /= max(_closing(normals, j, normals[j]), _LEVEL)
                 for i in range(3):
                     w[i] -= over * normals[j, i]
         scale = min(fastest / max(sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), _LEVEL), 1.0)

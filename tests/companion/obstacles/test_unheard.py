@@ -111,6 +111,16 @@ def test_a_plan_is_heard_with_the_usual_error_of_vehicles_on_theirs() -> None:
     assert 0.0 < measured.gaps[0] - planned.gaps[0] < 0.3
 
 
+def test_at_one_height_places_above_and_below_are_seen_from_the_side() -> None:
+    config, here = CONFIG.model_copy(update={"planar": True}), np.array([[3.0, 0.0, 4.0]])
+    flat = Unheard(config).bounds(0, heard(1.0, places=here), ORIGIN)
+    full = Unheard(CONFIG).bounds(0, heard(1.0, places=here), ORIGIN)
+    assert flat is not None
+    assert full is not None
+    assert flat.gaps == full.gaps
+    assert flat.normals.tolist() == [[pytest.approx(0.6), 0.0, 0.0]]
+
+
 def test_above_and_below_the_downwash_counts() -> None:
     config = CONFIG.model_copy(update={"field": CONFIG.field.model_copy(update={"downwash": 2.0})})
     beside = Unheard(config).bounds(0, heard(1.0, places=at(4.0)), ORIGIN)
