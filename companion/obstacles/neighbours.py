@@ -48,10 +48,11 @@ See ``_rank``.
 """
 _LATE_US = 50_000
 """A message dated further (µs) before arrival and least delay is late, or its sender has another clock."""
-_KEPT_US = 3_000_000
-"""A vehicle stays in a perception formation for this time (µs) after its last plan or position."""
 _FLEET_US = 5_000_000
-"""A vehicle whose companion has been silent for longer (µs) is no vehicle of the fleet."""
+"""A vehicle whose companion has been silent for longer (µs) is no vehicle of the fleet.
+
+So long it stays in a perception formation after its last plan or position.
+"""
 _MAX_PLAN_DEVIATION = 1.0
 """m; if a neighbour is further than this from its plan, its track is used instead of the plan.
 
@@ -442,15 +443,15 @@ class Neighbours:
         return frozenset(compress(self._ids, self._planning(now).tolist())) if self._ids else frozenset()
 
     def _planned_lately(self, now: int, planning: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return, for each neighbour, whether its plan was fresh in the last ``_KEPT_US``.
+        """Return, for each neighbour, whether its plan was fresh in the last ``_FLEET_US``.
 
         ``planning`` (M,): whether it is fresh at ``now`` (µs). Otherwise neighbours would leave the
         formation and come back every few seconds on a link that loses messages.
         """
         for system in compress(self._ids, planning.tolist()):
             self._planned[system] = now
-        lately = [now - self._planned.get(system, now - _KEPT_US - 1) <= _KEPT_US for system in self._ids]
-        return np.array(lately) & (now - self._times <= _KEPT_US)
+        lately = [now - self._planned.get(system, now - _FLEET_US - 1) <= _FLEET_US for system in self._ids]
+        return np.array(lately) & (now - self._times <= _FLEET_US)
 
     def _planning(self, now: int) -> NDArray[np.bool_]:
         """Return, for each neighbour, whether it flies by plans of its own."""

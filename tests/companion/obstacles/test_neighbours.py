@@ -436,7 +436,8 @@ def test_a_mate_of_a_perception_formation_outlasts_some_lost_messages():
         neighbours = hearing(position(X, V), plan(X, V), config=config)
         assert neighbours.mates(NOW).ids == (OTHER,)
         assert neighbours.mates(later).ids == kept
-        assert neighbours.mates(NOW + 4_000_000).ids == ()
+        assert neighbours.mates(NOW + 4_900_000).ids == kept
+        assert neighbours.mates(NOW + 6_000_000).ids == ()
 
 
 def test_with_committed_plans_a_mate_is_who_reports_its_position():
@@ -444,4 +445,4 @@ def test_with_committed_plans_a_mate_is_who_reports_its_position():
     autopilot = position(X, V, system=13)._replace(source=Source(13, 1))
     neighbours = hearing(position(X, V), autopilot, config=config)
     assert neighbours.mates(NOW).ids == (OTHER,)
-    assert neighbours.mates(NOW + 4_000_000).ids == ()
+    assert neighbours.mates(NOW + 6_000_000).ids == ()
