@@ -27,6 +27,9 @@ from sitl.vehicle.multirotor import VehicleState
 # Separates these random numbers from those of the vehicle's other parts, which have the same seeds.
 _RNG_STREAM_ID: Final = 0x43
 _BEAT_US: Final = 1_000_000
+_SEARCH_US: Final = 500_000
+# A gimbal that follows returns to its first pitch after this time without a detection: it may have followed a
+# false one, and the target may be out of view since.
 
 
 class Image(NamedTuple):
@@ -66,6 +69,7 @@ class Camera:
         self._then = 0
         self._waiting: deque[Image] = deque()
         self._turned: list[Message] = []
+        self._seen = 0
 
     def receive(self, message: HilState) -> None:
         """Receive the true place of a body."""
@@ -125,7 +129,10 @@ class Camera:
             said.append(fov_status(self.source, camera, image.pose, geodetic))
         self.last = image.view, None
         if seen is None:
+            if image.time - self._seen >= _SEARCH_US:
+                self.mount.search()
             return said
+        self._seen = image.time
         self._aim(image.view, seen)
         if config.speaks == "image":
             said.append(image_status(self.source, config, camera, seen))

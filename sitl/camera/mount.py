@@ -19,22 +19,31 @@ class Mount:
     def __init__(self, config: FixedMount | GimbalMount) -> None:
         self._config = config
         self.pitch = -math.radians(config.pitch_deg)
-        self._wanted = self.pitch
+        self._ordered = self._wanted = self.pitch
         self.on_gimbal = isinstance(config, GimbalMount)
 
     def turn(self, pitch: float) -> bool:
         """Turn to ``pitch`` (rad, above the horizon), as far as the gimbal can; return False without one."""
-        config = self._config
-        if isinstance(config, FixedMount):
+        if not self.on_gimbal:
             return False
-        low, high = -math.radians(config.lowest_deg), -math.radians(config.highest_deg)
-        self._wanted = max(low, min(high, pitch))
+        self._ordered = self._wanted = self._within(pitch)
         return True
 
     def follow(self, pitch: float) -> None:
         """Turn to ``pitch`` (rad, above the horizon) if the gimbal follows what is detected."""
         if isinstance(self._config, GimbalMount) and self._config.follows:
-            self.turn(pitch)
+            self._wanted = self._within(pitch)
+
+    def search(self) -> None:
+        """Return to the first pitch, or to the last ordered one: nothing is detected."""
+        self._wanted = self._ordered
+
+    def _within(self, pitch: float) -> float:
+        config = self._config
+        if isinstance(config, FixedMount):
+            return pitch
+        low, high = -math.radians(config.lowest_deg), -math.radians(config.highest_deg)
+        return max(low, min(high, pitch))
 
     def advance(self, seconds: float) -> None:
         """Turn for ``seconds`` towards the wanted pitch, at the gimbal's rate."""

@@ -274,6 +274,18 @@ def test_a_gimbal_keeps_the_horizon_and_follows_the_target() -> None:
     assert -euler(bench.all(CameraFovStatus)[-1].attitude)[1] == pytest.approx(aim, abs=0.02)
 
 
+def test_a_gimbal_that_followed_something_false_finds_the_target_again() -> None:
+    """It returns to its first pitch; otherwise the target would be out of view for good."""
+    bench = Bench(mount=GIMBAL)
+    for north in (8.0, 4.5, 3.0):
+        bench.target = (0.0, north, 0.0)
+        bench.run(2.0)
+    bench.target = (0.0, 8.0, 0.0)
+    before = len(bench.all(CameraTrackingGeo))
+    bench.run(3.0)
+    assert len(bench.all(CameraTrackingGeo)) - before > 15
+
+
 def test_a_gimbal_turns_on_command_no_faster_than_it_can() -> None:
     bench = Bench(mount={"kind": "gimbal", "pitch_deg": 0.0, "follows": False, "rate_deg_s": 30.0})
     bench.run(1.0)
