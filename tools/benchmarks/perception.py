@@ -177,7 +177,10 @@ def fly(case: str, sensors: str, seed: int, seconds: float) -> tuple[Scenario, S
 
 
 def errors(heard: Heard, samples: Samples, vehicle: int | None = None) -> tuple[Array, Array]:
-    """Return errors (n, 3), m, and covariances (n, 3, 3) of the filter, or of one with a single camera."""
+    """Return errors (n, 3), m, and covariances (n, 3, 3) of the filter, or of one with a single camera.
+
+    Without a row if that camera sees nothing.
+    """
     fusion = Fusion(heard.source, FROM_US)
     times, places, covariances = [], [], []
     for one in heard.detections:
@@ -191,7 +194,7 @@ def errors(heard: Heard, samples: Samples, vehicle: int | None = None) -> tuple[
             places.append(known.position)
             covariances.append(known.covariance)
     true = np.column_stack([np.interp(times, samples.time, axis) for axis in samples.target.T])
-    return np.array(places) - true, np.array(covariances)
+    return np.array(places).reshape(-1, 3) - true, np.array(covariances).reshape(-1, 3, 3)
 
 
 def nees(off: Array, covariances: Array) -> tuple[float, float]:
