@@ -122,6 +122,8 @@ class World:
         """Receive one message from ``link``; a message that does not concern the picture is ignored."""
         if link == "swarm" and isinstance(message, GlobalPosition):
             self.neighbours.receive_position(now, message)
+            if isinstance(self.target, FusedTarget):
+                self.target.heard(now, message.source, message.time_boot)
         elif link == "swarm" and isinstance(message, Tunnel):
             self.neighbours.receive_plan(now, message)
         elif self.cameras is not None and isinstance(message, CAMERA_MESSAGES):

@@ -13,24 +13,18 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.config.target_source import FusedSource
+from companion.estimation.camera_weights import CameraWeights
 from companion.estimation.detections import Detection, detection
-from companion.estimation.fusion import Belief, Fusion, Seen
+from companion.estimation.fusion import Belief, Fusion
 from companion.estimation.fusion_filter import worst_sigma
 from companion.estimation.fusion_log import Counts, FusionLog, FusionTally
 from companion.estimation.tracks import State
 from companion.values.horizon import Array
 from companion.values.mates import Sight
 from mavlink_bridge.frames import FleetFrame, Point
-from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo
+from mavlink_bridge.messages import CameraFovStatus, CameraTrackingGeo, Source
 
 _MAX_DISTANCE_M = 1e5
-_SPANS_US = 2_000_000, 4_000_000, 8_000_000, 16_000_000
-"""Times (µs) over which the cameras' weights are measured.
-
-It is the shortest with ``_EVIDENCE`` detections of a neighbour: where most messages are lost, none may arrive
-within two seconds of a camera that sees.
-"""
-_EVIDENCE = 10
 _SEEN_US = 500_000
 """Time (µs) in which a detection counts as seeing now."""
 
@@ -46,16 +40,13 @@ class Outgoing(NamedTuple):
     message: CameraTrackingGeo
 
 
-_ENOUGH = 0.5
-"""A camera with this share of the detections of the best one counts in full, one with fewer in proportion."""
-
-
 class FusedTarget:
     """Estimate of the target by the companion of ``system``; it is used as ``Target`` is."""
 
     def __init__(self, config: CompanionConfig, source: FusedSource, system: int, fleet: FleetFrame) -> None:
         self._config, self._source, self._system, self._fleet = config, source, system, fleet
         self._fusion = Fusion(source, config.target.rewind_us)
+        self._weights = CameraWeights(config, system, source.latency_us)
         self._own = self._others = self._invalid = 0
         self._waiting: Outgoing | None = None
         self._next = 0
@@ -97,6 +88,10 @@ class FusedTarget:
         """Count a detection that cannot be used."""
         self._invalid += 1
 
+    def heard(self, now: int, source: Source, stamp: int) -> None:
+        """Receive that a position of a neighbour's companion arrived at ``now`` (µs) with ``stamp``."""
+        self._weights.heard(now, source, stamp)
+
     def receive(
         self,
         now: int,
@@ -116,6 +111,7 @@ class FusedTarget:
         self._last = _NOTHING_ASKED
         if not self._fusion.put(found):
             return False
+        self._weights.saw(message.source)
         if message.source.system != self._system:
             self._others += 1
             return True
@@ -163,15 +159,9 @@ class FusedTarget:
 
     def sight(self, now: int, ahead: float) -> Sight:
         """Return what is known beside the state; the horizon ends ``ahead`` (s) after ``now`` (µs)."""
-        recent = self._measured(now)
-        if not recent:
+        weights = self._weights.measured(now, self._fusion)
+        if not weights:
             return Sight()
-        weights = {}
-        for system, seen in recent.items():
-            # Messages of neighbours are lost, none of the own: a camera is compared with others.
-            others = [one.number for other, one in recent.items() if other not in (system, self._system)]
-            share = min(1.0, seen.number / max(_ENOUGH * max(others, default=0), 1.0))
-            weights[system] = share * seen.weight
         known = self._known(now + round(1e6 * ahead))
         prior = 0j
         if known is not None:
@@ -179,16 +169,6 @@ class FusedTarget:
             # −½(λ₁ − λ₂) e^{2iφ₁} of the information in the plane.
             prior = complex(0.5 * (a - d), b) / (a * d - b * b)
         return Sight(MappingProxyType(weights), prior)
-
-    def _measured(self, now: int) -> dict[int, Seen]:
-        """Return the detections over the span that tells which cameras see; empty if none is recent."""
-        found: dict[int, Seen] = {}
-        for span in _SPANS_US:
-            found = self._fusion.recent(now - span - self._source.latency_us)
-            best = max((one.number for other, one in found.items() if other != self._system), default=0)
-            if not found or best >= _EVIDENCE:
-                break
-        return found
 
     def _known(self, time: int) -> Belief | None:
         """Return what is known at ``time`` (µs); None before the first detection.

@@ -109,6 +109,8 @@ class Fusion:
             self._began = min(self._began, detection.time)
         self._newest = max(self._newest, detection.time)
         self._pending.append(detection)
+        if len(self._pending) == _CAPACITY // 2:
+            self._process()
         return True
 
     @property
@@ -219,6 +221,9 @@ class Fusion:
         if not self._pending or self._began is None:
             return
         pending, self._pending = self._pending, []
+        if len(self._detections) + len(pending) > _CAPACITY:
+            # Of processed ones alone is the state known with which the filter then begins.
+            self._drop(_CAPACITY // 2)
         new = {one.vehicle for one in pending if not one.estimate} - self._slots.keys()
         first = len(self._detections)
         for vehicle in sorted(new):
@@ -243,8 +248,6 @@ class Fusion:
 
     def _insert(self, one: Detection) -> int:
         """Insert a detection in the order of images; return its index."""
-        if len(self._detections) == _CAPACITY:
-            self._drop(_CAPACITY // 2)
         count = len(self._detections)
         place = count
         if count and _order(one) < _order(self._detections[-1]):
@@ -298,6 +301,8 @@ class Fusion:
         self._drop(count - 1)
         self._forgotten_refused += 1
         self._detections.clear()
+        # What passed was near a wrong place.
+        self._earlier.clear()
         self._began = kept[0].time
         self._start(kept[0])
         self._forgotten_refused -= len(kept)

@@ -20,7 +20,7 @@ the own position is unknown or the own speed exceeds v. ``near`` selects the nei
 bound, with their measured speeds where these exceed v. It also keeps those above or below the own position at
 any height, because vehicles land straight down. The certified mode receives and uses all messages, since
 there the commitments of a neighbour count and not its position; so does the swivel method, which uses all
-bearings.
+bearings, and a perception formation with fused detections, which uses all bearings and counts the positions.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.config import CompanionConfig
+from companion.config.formation import Perception
 from companion.config.planning import FADING, MethodName
+from companion.config.target_source import FusedSource
 from companion.estimation.tracks import State
 from companion.obstacles.reachable_ball import further, norms
 from companion.values.compiled import (
@@ -95,6 +97,8 @@ class RelevanceFilter:
         self._relevant_distance = _reach(self._closing, *self._reach_terms) + self._closing * self._horizon_s
         self._landing_distance = config.guard.landing_clearance + config.field.margin(2)
         self._use_all = False
+        fused = isinstance(config.target_source, FusedSource)
+        self._sees = fused and isinstance(config.formation, Perception)
         self._ignored_until: dict[int, int] = {}
         self.now = 0
         self.use(config.methods)
@@ -103,7 +107,8 @@ class RelevanceFilter:
         """Adapt to the ``methods`` that the planner uses from now on."""
         # The bounds are Euclidean, and with downwash a vehicle high above is nearer than that.
         downwash = self._config.field.downwash > 1.0
-        self._use_all = self._config.avoidance == "certified" or "swivel" in methods or downwash
+        certified = self._config.avoidance == "certified"
+        self._use_all = certified or "swivel" in methods or downwash or self._sees
         self._ignored_until.clear()
 
     def ignores(self, sender: int) -> bool:

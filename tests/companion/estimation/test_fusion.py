@@ -427,6 +427,37 @@ def test_detections_beyond_the_window_are_remembered():
         assert seen[11].weight == pytest.approx(found[0].weight, rel=1e-6)
 
 
+def test_a_new_beginning_forgets_who_saw_the_wrong_place():
+    """Vehicle 12 sees a wrong place for six seconds, alone; then 11 sees the true one."""
+    source, camera = source_of("truth"), np.array([6.0, 0.0, 5.0])
+    fusion = Fusion(source, WINDOW)
+    for tick in range(120):
+        vehicle, place = (12, np.array([20.0, 0.0, 0.0])) if tick < 60 else (11, np.zeros(3))
+        if not 60 <= tick < 75:
+            time = START + tick * STEP
+            one = detection(source, vehicle, time, place, tuple(camera), message(vehicle, place, camera))
+            assert one is not None
+            fusion.put(one)
+            fusion.at(time, WINDOW)
+    assert fusion.restarts == 1
+    assert set(fusion.recent(START)) == {11}
+
+
+def test_more_detections_at_once_than_are_kept_are_all_processed():
+    source, found, _ = flight("rtk", 3, 22.0)
+    assert len(found) == 660
+    once, singly = Fusion(source, 60_000_000), Fusion(source, 60_000_000)
+    for one in found:
+        once.put(one)
+    for one in found:
+        singly.put(one)
+        singly.at(one.time, WINDOW)
+    a, b = at(once, found[-1].time), at(singly, found[-1].time)
+    np.testing.assert_allclose(a.position, b.position, atol=1e-9)
+    np.testing.assert_allclose(a.covariance, b.covariance, atol=1e-9)
+    assert (once.used, once.refused) == (singly.used, singly.refused)
+
+
 def test_a_kernel_of_no_vehicle_and_no_detection_does_nothing():
     n, memory = TARGET + PER_VEHICLE, ADAPTED + MARKS
     empty = np.zeros(0, dtype=np.int64)
