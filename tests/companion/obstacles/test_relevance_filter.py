@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from companion.avoidance.field.planner import Planner, standing
 from companion.config.companion import CompanionConfig, MovingSphere
 from companion.config.flight import GuardConfig, RatesConfig
+from companion.config.formation import Perception
 from companion.config.planning import ApproachAngleConfig, FieldConfig
+from companion.config.target_source import FusedSource
 from companion.estimation.tracks import State
 from companion.goals.settling import Settling
 from companion.telemetry.reception import accepts
@@ -285,6 +287,9 @@ def test_nobody_comes_near_unheard(direction, speed):
     assert max(silences) < 1_000_000
 
 
+SEEING = {"formation": Perception(kind="perception"), "target_source": FusedSource(kind="fused")}
+
+
 @pytest.mark.parametrize(
     ("who", "config", "changes"),
     [
@@ -294,6 +299,7 @@ def test_nobody_comes_near_unheard(direction, speed):
         ("anybody, who is too fast itself", CONFIG, {"own": np.array([0.0, 12.0, 0.0])}),
         ("anybody, with certified plans", CONFIG.model_copy(update={"avoidance": "certified"}), {}),
         ("anybody, by the swivel", CONFIG.model_copy(update={"methods": ("swivel",)}), {}),
+        ("anybody whose camera counts", CONFIG.model_copy(update=SEEING), {}),
     ],
 )
 def test_always_heard_is(who, config, changes):
