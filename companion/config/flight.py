@@ -65,7 +65,8 @@ class GuardConfig(Settings):
     unheard_speed: Positive = Field(
         1.0,
         description="m/s: the field's distances to an unheard neighbour grow at this rate, until"
-        " neighbour_lost_us; and at least this speed is allowed beside one that counts as gone",
+        " neighbour_lost_us; and at least this speed is allowed beside one that counts as gone,"
+        " and away from one that is too near",
     )
     unheard_wait_us: int = Field(
         15_000_000,

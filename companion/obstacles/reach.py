@@ -1,10 +1,16 @@
 """How far neighbours may have come since they were heard last.
 
-A vehicle that keeps ``SpeedBounds`` is fast only far from all whose places it is not sure of, and it is never
-nearer to another one than its own bound for it says. So the other one, at a true gap g, sees it come no
-faster than w(g): the radius around the last place in which it may be grows with w of the gap that is left.
-This holds whatever either of the two hears: loss need not be symmetric, and silence may last as long as it
-likes. A vehicle that was faster when it was heard last is taken to brake first.
+A vehicle that keeps ``SpeedBounds`` flies no faster than w of its own gap to each neighbour. If that gap is
+not larger than the neighbour's gap to it, the neighbour may count on w of its own gap: the radius of the ball
+around the last place grows at that speed. A vehicle that was faster when it was heard last is taken to brake
+first.
+
+This is a rule and no proof. A vehicle that hears the other one, or has overtaken it, may have the larger gap.
+It then flies faster than the ball grows, leaves the ball, and may come near the other one from another side.
+
+A vehicle to which a neighbour's last place itself is too near may leave it (``SpeedBounds.leaving``). As long
+as that place is right and the other one does the same, their distance does not become smaller by it, and
+beside other neighbours the bounds for these hold.
 """
 
 from __future__ import annotations
@@ -34,11 +40,12 @@ class Reach:
 
         ``ages`` (M,), µs, and ``speeds`` (M,), m/s, are those of the neighbours' last states, and ``spread``
         (M,), m, is how far these may be from the truth. ``distances`` (M,), m: from the own place to theirs,
-        less what has to be kept. Rows are only ever added.
+        less what has to be kept. Rows are only ever added. A state of another time than at the last call
+        counts as heard anew, also an older one: its radius is that of its age.
         """
         known, elapsed = len(self._ages), now - self._called
         heard = np.ones(len(ages), dtype=np.bool_)
-        heard[:known] = ages[:known] < self._ages + elapsed
+        heard[:known] = ages[:known] != self._ages + elapsed
         radii = spread.copy()
         radii[:known] = np.where(heard[:known], radii[:known], self._radii)
         gaps = np.maximum(distances - radii, 0.0)

@@ -3,7 +3,8 @@
 A vehicle that hears nothing of a neighbour does not know whether that one hears it. If both fly on, each
 avoids a place where the other is no longer. With ``guard.unheard_us`` each keeps clear of the places where an
 unheard neighbour may be (``Reach``): it stops before them, and the nearer they are the slower it flies, in
-every direction (``SpeedBounds``), because the others count on that. The field's distances to the neighbour
+every direction (``SpeedBounds``), because the others count on that. If it is already too near to the last
+state of a neighbour, it may leave with ``guard.unheard_speed``. The field's distances to the neighbour
 grow, too, until ``guard.neighbour_lost_us``. A neighbour that has been silent for longer than
 ``guard.unheard_wait_us`` counts as gone, because it must not hold up the others for ever: then only a ball
 of the size to which the field's distances have grown remains. This is a rule of the field and no proof.
@@ -79,7 +80,8 @@ class Unheard:
         off = (heard.states[:, 0:3] - place) * self._scale
         distances = norms(off)
         clear, speeds = distances - self._d_min, norms(heard.states[:, 3:6])
-        reach = self._reach.grown(now, ages, speeds, clear, np.where(heard.planned, _PLAN_ERROR_M, 0.0))
+        spread = np.where(heard.planned, _PLAN_ERROR_M, 0.0)
+        reach = self._reach.grown(now, ages, speeds, clear, spread)
         unheard = self._silence(now, ages) > self._after
         if not unheard.any():
             return None
@@ -93,6 +95,7 @@ class Unheard:
             np.ascontiguousarray(normals[unheard]),
             np.maximum(clear - reach, 0.0)[unheard],
             np.where(gone, self._growth, 0.0)[unheard],
+            np.where(clear <= spread, self._growth, 0.0)[unheard],
             self._braking,
             self._time,
         )

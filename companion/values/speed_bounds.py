@@ -6,6 +6,9 @@ At a gap g from such a place a vehicle flies, in every direction, no faster than
 
 and towards it no faster than it can stop within g. If two vehicles keep w at the gap between them, it shrinks
 by at most 2 w: each decelerates by b at most, and because w is at most g/T the gap never closes.
+
+Where g is 0, w is 0 in every direction. A vehicle that is already too near to another one would stay there:
+it may therefore fly away from it with a small speed, in every direction in which it comes no nearer.
 """
 
 from __future__ import annotations
@@ -28,16 +31,20 @@ _LEVEL = 1e-9
 class SpeedBounds(NamedTuple):
     """K places that a vehicle at ``place`` (3,), m, must not come near.
 
-    ``normals`` (K, 3): unit vectors towards them, or the horizontal parts of these for flights at one height;
-    ``gaps`` (K,), m: how far they are along these, at least 0.
-    ``floors`` (K,), m/s: speed that is allowed beside each at any gap, other than towards it. ``braking``
-    (m/s²) is b and ``time`` (s) is T.
+    ``normals`` (K, 3): by how much (m/m) each gap shrinks with a motion along each axis. They point at the
+    places and are unit vectors at most: distances are those of an ellipsoid, where a metre of height counts
+    less, and for flights at one height the vertical parts are 0.
+    ``gaps`` (K,), m: how far the places are in that measure, at least 0.
+    ``floors`` (K,), m/s: speed that is allowed beside each at any gap, other than towards it.
+    ``leaving`` (K,), m/s: speed that is allowed at any gap in directions in which the vehicle comes no nearer
+    to the place. ``braking`` (m/s²) is b and ``time`` (s) is T.
     """
 
     place: Array
     normals: Array
     gaps: Array
     floors: Array
+    leaving: Array
     braking: float
     time: float
 
@@ -48,7 +55,8 @@ class SpeedBounds(NamedTuple):
             return inf
         fastest = np.maximum(allowed(self.gaps, self.braking, self.time), self.floors)
         closing = self.normals @ (towards / size)
-        ahead = closing > 0.0
+        ahead = closing > _LEVEL
+        fastest = np.where(ahead, fastest, np.maximum(fastest, self.leaving))
         reach = self.braking * REACTION_S
         stopping = np.sqrt(reach * reach + 2.0 * self.braking * self.gaps[ahead]) - reach
         return float(min(fastest.min(), (stopping / closing[ahead]).min(initial=inf)))
@@ -72,7 +80,11 @@ class Slowing:
             x,
             v,
             flown,
-            *bounds[:4],
+            bounds.place,
+            bounds.normals,
+            bounds.gaps,
+            bounds.floors,
+            bounds.leaving,
             self._jerk,
             self._a_total,
             self._dt,
@@ -111,7 +123,12 @@ def _closing(normals: Array, j: int, velocity: Array) -> float:
     return speed
 
 
-@kernel(VOID, *[array(1)] * 4, array(2), *[array(1)] * 3, *[FLOAT] * 5, output(2))
+@part
+def _norm(velocity: Array) -> float:
+    return sqrt(velocity[0] * velocity[0] + velocity[1] * velocity[1] + velocity[2] * velocity[2])
+
+
+@kernel(VOID, *[array(1)] * 4, array(2), *[array(1)] * 4, *[FLOAT] * 5, output(2))
 def _keep(
     place: Array,
     velocity: Array,
@@ -120,6 +137,7 @@ def _keep(
     normals: Array,
     gaps: Array,
     floors: Array,
+    leaving: Array,
     jerks: Array,
     a_total: float,
     dt: float,
@@ -129,15 +147,15 @@ def _keep(
     a: Array,
 ) -> None:
     """Amend ``a`` (n, 3) as ``Slowing.keep`` says; ``step`` (s) is the time for the first change."""
-    x, v, last, w, towards = place.copy(), velocity.copy(), flown.copy(), np.empty(3), np.empty(len(gaps))
+    x, v, last, w = place.copy(), velocity.copy(), flown.copy(), np.empty(3)
+    towards, beside = np.empty(len(gaps)), np.empty(len(gaps))
     reach = braking * REACTION_S
     for k in range(len(a)):
-        fastest = inf
         for j in range(len(gaps)):
             gap = gaps[j] - _closing(normals, j, x - origin) - dt * max(_closing(normals, j, v), 0.0)
             gap = max(gap, 0.0)
             towards[j] = sqrt(reach * reach + 2.0 * braking * gap) - reach
-            fastest = min(fastest, max(_allowed(gap, braking, time), floors[j]))
+            beside[j] = max(_allowed(gap, braking, time), floors[j])
         for i in range(3):
             w[i] = v[i] + dt * a[k, i]
         for _ in range(_ROUNDS):
@@ -146,11 +164,13 @@ def _keep(
                 over /= max(_closing(normals, j, normals[j]), _LEVEL)
                 for i in range(3):
                     w[i] -= over * normals[j, i]
-        scale = min(fastest / max(sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), _LEVEL), 1.0)
+        scale, speed = 1.0, max(_norm(w), _LEVEL)
         for j in range(len(gaps)):
             closing = _closing(normals, j, w)
-            if scale * closing > towards[j]:
-                scale = towards[j] / closing
+            if closing > _LEVEL * speed:
+                scale = min(scale, beside[j] / speed, towards[j] / closing)
+            else:
+                scale = min(scale, max(beside[j], leaving[j]) / speed)
         size = 0.0
         for i in range(3):
             w[i] = (scale * w[i] - v[i]) / dt

@@ -1,4 +1,4 @@
-"""A shared plan is as good as a position to who hears nothing else, if its sender can be there."""
+"""A shared plan counts like a position if nothing else is heard, and if its sender can be there."""
 
 from __future__ import annotations
 

@@ -62,12 +62,22 @@ def test_a_vehicle_stops_before_where_the_other_may_be(silence: float, distance:
 @pytest.mark.parametrize("towards", [EAST, -EAST, NORTH])
 def test_the_nearer_the_others_may_be_the_slower_a_vehicle_flies_in_every_direction(towards: Array) -> None:
     """The others count on it: they do not know whom it hears."""
-    speeds = [pace(Unheard(CONFIG), 0, heard(1.0, places=at(one)), towards) for one in (0.4, 1.0, 3.0, 9.0)]
-    assert speeds[0] == 0.0
+    speeds = [pace(Unheard(CONFIG), 0, heard(1.0, places=at(one)), towards) for one in (0.51, 1.0, 3.0, 9.0)]
+    assert speeds[0] < 0.02
     assert speeds == sorted(speeds)
     assert speeds[2] <= 3.0 - D_MIN
     slow = [pace(Unheard(CONFIG), 0, heard(one, places=at(3.0)), towards) for one in (0.5, 1.0, 2.0, 9.0)]
     assert slow == sorted(slow, reverse=True)
+
+
+@pytest.mark.parametrize("planned", [False, True])
+def test_a_vehicle_that_is_too_near_leaves_and_comes_no_nearer(planned: bool) -> None:
+    what = heard(1.0, places=at(0.4), planned=planned)
+    assert pace(Unheard(CONFIG), 0, what) == 0.0
+    assert pace(Unheard(CONFIG), 0, what, -EAST) == GROWTH
+    # The place that is only possible, and not the last one, is no reason.
+    silent = heard(14.0, places=at(0.9))
+    assert pace(Unheard(CONFIG), 0, silent, -EAST) < 0.3
 
 
 def test_the_field_s_distances_stop_growing_when_a_neighbour_is_lost() -> None:

@@ -18,9 +18,10 @@ PLACES = st.lists(st.tuples(UNIT, numbers(0.0, 12.0)), min_size=1, max_size=7)
 PUSHES = st.lists(vectors(4.0), min_size=STEPS, max_size=STEPS)
 
 
-def bounds_of(places, floor=0.0):
+def bounds_of(places, floor=0.0, leaving=0.0):
     normals, gaps = (np.array(part) for part in zip(*places, strict=True))
-    return SpeedBounds(ZERO, normals, gaps, np.full(len(gaps), floor), BRAKING, TIME)
+    floors, leaving = np.full(len(gaps), floor), np.full(len(gaps), leaving)
+    return SpeedBounds(ZERO, normals, gaps, floors, leaving, BRAKING, TIME)
 
 
 def flown(velocity, a):
@@ -110,10 +111,10 @@ def test_bounded_jerk_comes_first(places, velocity, pushes, elapsed):
 
 
 @LAWS
-@given(places=PLACES, towards=UNIT, floor=numbers(0.0, 1.0))
-def test_the_speed_in_a_direction_is_that_of_a_plan_that_wants_more(places, towards, floor):
+@given(places=PLACES, towards=UNIT, floor=numbers(0.0, 1.0), leaving=numbers(0.0, 1.0))
+def test_the_speed_in_a_direction_is_that_of_a_plan_that_wants_more(places, towards, floor, leaving):
     """Away from all places, so that the gaps do not shrink on the way: the aim and the plan agree."""
-    bounds = bounds_of(places, floor)
+    bounds = bounds_of(places, floor, leaving)
     ahead = bounds.normals @ towards > 0.0
     bounds = bounds._replace(normals=np.where(ahead[:, None], -bounds.normals, bounds.normals))
     speed = bounds.along(towards)
@@ -125,7 +126,8 @@ def test_the_speed_in_a_direction_is_that_of_a_plan_that_wants_more(places, towa
 def test_without_a_direction_or_a_place_nothing_is_bounded():
     bounds = bounds_of([(np.array([1.0, 0.0, 0.0]), 3.0)])
     assert bounds.along(ZERO) == inf
-    none = bounds._replace(normals=np.zeros((0, 3)), gaps=np.zeros(0), floors=np.zeros(0))
+    empty = np.zeros(0)
+    none = bounds._replace(normals=np.zeros((0, 3)), gaps=empty, floors=empty, leaving=empty)
     assert none.along(np.array([1.0, 0.0, 0.0])) == inf
 
 
@@ -135,3 +137,25 @@ def test_beside_one_that_is_gone_a_vehicle_leaves_at_the_floor_and_comes_no_near
     assert bounds.along(np.array([1.0, 0.0, 0.0])) == 0.0
     assert bounds.along(np.array([0.0, 1.0, 0.0])) == pytest.approx(floor)
     assert bounds.along(np.array([-1.0, 0.0, 0.0])) == pytest.approx(floor)
+
+
+@LAWS
+@given(places=PLACES, wish=UNIT, leaving=numbers(0.1, 1.0))
+def test_a_vehicle_without_a_gap_leaves_all_places_or_stays(places, wish, leaving):
+    """The aim and the plan agree on it: away at the small speed, and never towards a place."""
+    normals = np.array([one for one, _ in places])
+    bounds = bounds_of([(one, 0.0) for one in normals], leaving=leaving)
+    speed = bounds.along(wish)
+    assert speed == pytest.approx(0.0 if (normals @ wish > 1e-9).any() else leaving)
+    _, v = flown(ZERO, slowed(ZERO, np.tile(3.0 * wish / DT, (STEPS, 1)), bounds))
+    assert (normals @ v.T <= 1e-6).all()
+    assert (np.linalg.norm(v[1]) <= leaving + 1e-9).all()
+    if speed:
+        np.testing.assert_allclose(v[1], np.minimum(leaving, A_TOTAL * DT) * wish, atol=1e-6)
+
+
+def test_beside_a_place_that_is_left_the_others_bounds_hold():
+    east, north = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    bounds = bounds_of([(east, 0.0), (north, 0.2)])._replace(leaving=np.array([1.0, 0.0]))
+    assert bounds.along(-east) == pytest.approx(0.2)
+    assert bounds.along(east) == 0.0
