@@ -160,8 +160,9 @@ class CertifiedConfig(Settings):
     range: Positive | None = Field(
         None,
         description="m, true horizontal distance up to which two vehicles are certain to hear each other in"
-        " ``contact_us``, at whatever heights; who is beyond needs no agreement, and all plans are so short"
-        " that nobody is met unheard; the same for the whole fleet; null: all agree with all",
+        " ``contact_us``, at any heights; vehicles beyond it need no agreement, and all plans are so short"
+        " that vehicles that have not heard each other do not meet; the same for the whole fleet; null: all"
+        " agree with all",
     )
     contact_us: int = Field(
         500_000,

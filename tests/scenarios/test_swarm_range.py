@@ -100,10 +100,13 @@ def test_certified_flights_that_no_range_allows_are_refused() -> None:
 def test_radios_must_reach_so_far_that_who_leaves_is_heard_beyond_the_range(
     planar: bool, airborne: bool, heights: float
 ) -> None:
-    """By two margins and what two vehicles part in an epoch; the error gives a value that is allowed."""
+    """By two margins and what two vehicles part in an epoch; the error gives a value that is allowed.
+
+    Heights differ by two margins more than those of plans.
+    """
     settings = {"range": 15.0, "tube": 0.5, "drift": 0.5, "clock_us": 0, "sigmas": 0.0, "epoch_us": 200_000}
     leaves = 15.0 + 2.0 * 0.5 + 2.0 * 0.2 * np.sqrt(1.5**2 + 1.5**2 + 0.5**2)
-    least = np.hypot(leaves, heights)
+    least = np.hypot(leaves, heights + 2.0 * 0.5)
 
     def ready(radio: float) -> None:
         prepared(certified(radio, planar=planar, airborne=airborne, **settings), "a file")
@@ -119,13 +122,20 @@ def test_radios_must_reach_so_far_that_who_leaves_is_heard_beyond_the_range(
 
 
 def test_radios_must_reach_a_vehicle_on_the_ground_within_the_range() -> None:
-    """Of those that fly in one plane nobody is above another, but they land."""
+    """Of those that fly in one plane no plan is above another, but they land."""
     settings = {"range": 15.0, "tube": 0.05, "drift": 0.05, "clock_us": 0, "sigmas": 0.0, "epoch_us": 200_000}
     high = certified(16.5, planar=True, **settings)
     prepared(high.model_copy(update={"starts": high.starts.model_copy(update={"height": 4.0})}), "a file")
     high = high.model_copy(update={"starts": high.starts.model_copy(update={"height": 9.0})})
-    with pytest.raises(InputError, match=r"more than 17\.493 m"):
+    with pytest.raises(InputError, match=r"more than 17\.545 m"):
         prepared(high, "a file")
+
+
+def test_true_heights_differ_by_two_margins_more_than_those_of_plans() -> None:
+    """With `gnss` a margin is 2.062 m, as k · σ counts in each direction."""
+    of = certified(45.6, planar=True, range=40.0).model_copy(update={"sensors": "gnss"})
+    with pytest.raises(InputError, match=r"more than 45\.683 m"):
+        prepared(of, "a file")
 
 
 def test_the_radios_of_the_comparison_reach_far_enough() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from math import hypot, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.columns import levelled
@@ -21,7 +22,7 @@ from companion.config import CompanionConfig
 from companion.config.obstacles import Post, Sphere
 from companion.obstacles.boxes import boxes_of
 from companion.obstacles.static import Axes, FixedObstacles
-from companion.values.boxes import Boxes, BoxIndex
+from companion.values.boxes import Boxes, BoxIndex, distances
 from companion.values.horizon import Array
 from companion.world import View, World
 
@@ -148,6 +149,19 @@ class ConstraintSources:
                     centres[..., 2] = own[..., 2]
                 found.append((centres, self._from_surfaces + radius))
         return found
+
+    def clear_of_fixed(self, places: Array) -> NDArray[np.bool_]:
+        """Return whether ``places`` (n, 3), m, are as far from all fixed obstacles as plans keep, (n,).
+
+        Posts act as if they had no top.
+        """
+        least = self._from_surfaces
+        clear = (self._balls.distance(places) >= least).all(axis=1)
+        below = places.copy()
+        below[:, 2] = -np.inf
+        clear &= (self._posts.distance(below) >= least).all(axis=1)
+        clear &= (distances(places, self._boxes.boxes) >= least).all(axis=1)
+        return np.asarray(clear)
 
     def _boxes_near(self, own: Array) -> Boxes | None:
         """Return the boxes near the plan ``own`` (n, 3, 3), m; None where no box is configured.

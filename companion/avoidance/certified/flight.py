@@ -44,6 +44,8 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack
 _TURNING_SENSES = {"left": -1.0}
 _EFFORT = 2
 """How much of a search is done for a plan."""
+_STOOD_US = 1_000_000
+"""Time (µs) within the tube of a plan at rest after which a vehicle that another controller flies stands."""
 
 
 class CertifiedFlight:
@@ -105,6 +107,7 @@ class CertifiedFlight:
         self._in_lane = False
         self._in_control = self._announced = self._received = self._participated = False
         self._turn = 0
+        self._prepared, self._begun_at = False, 0
         self._polled_at: int | None = None
         self._place: tuple[int, Array | None] | None = None
         self._next_announcement = 0
@@ -161,9 +164,15 @@ class CertifiedFlight:
             inside = float(difference @ difference) <= self._config.certified.tube**2
             if inside or (commitment.announced_until >= commitment.epoch(now) and not commitment.column):
                 commitment.turn(now)
+                if inside and not self._prepared and now - self._begun_at >= _STOOD_US:
+                    self._prepare()
                 return
         self.agreements.begin(commitment.begin(now, position))
-        self._prepare()
+        self._begun_at = now
+        if horizon is None:
+            self._prepare()
+            # Without a plan the vehicle rests. It may fly elsewhere later: there once more.
+            self._prepared = False
         self.reservation.watch(now)
         commitment.anchored_anew += self._announced
         self._in_control = self._announced = False
@@ -221,6 +230,7 @@ class CertifiedFlight:
 
     def _prepare(self) -> None:
         """Work out what ways need at the height of the newest plan, while the vehicle holds its place."""
+        self._prepared = True
         newest = self.commitment.announced()
         if self._way is not None and newest is not None:
             self._way.prepare(float(controls(newest)[-1, 2, 2]))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.constraint_sources import BESIDE_M, ConstraintSources
 from companion.avoidance.certified.free_place import covered, free_place
-from companion.avoidance.certified.surface_places import Comer, Taken, place_of
+from companion.avoidance.certified.surface_places import Candidate, Taken, place_of
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.config.formation import Nearest
@@ -17,6 +18,7 @@ from companion.values.horizon import Array
 
 _ON_SURFACE_M = 0.01
 """Distance of a destination from the surface up to which it is on it, and not moved off it by a limit."""
+_ROUNDING_M = 1e-6
 
 
 class Places:
@@ -27,7 +29,7 @@ class Places:
         # Another formation has places of its own.
         self._assigns = isinstance(config.formation, Nearest)
         limits = config.limits.within(config.field.margin(1))
-        self._low, self._high = np.array(limits.box_min[:2]), np.array(limits.box_max[:2])
+        self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self._height = 1.0 / config.field.downwash
 
     def destination(self, epoch: int, rest: Array, aim: Aim, agreements: Agreements) -> Array:
@@ -49,18 +51,36 @@ class Places:
             Taken(last.controls[-1, 2] - target, self._sources.from_last(last) + BESIDE_M, 0.0)
             for last in left.values()
         ]
-        comers = [Comer(self._own, rest - target, surface)]
+        candidates = [Candidate(self._own, rest - target, surface)]
         surface_of = self._config.surface_of
-        comers += [Comer(system, end - target, surface_of(system)) for system, end in ends.items()]
+        candidates += [Candidate(system, end - target, surface_of(system)) for system, end in ends.items()]
         try:
             wanted = surface.nearest(destination - target)
             off = destination - target - wanted
             if off @ off > _ON_SURFACE_M**2:
                 return destination
-            place = place_of(self._own, comers, taken, reach, wanted, self._height)
+
+            def allowed(places: Array, ends: Array) -> NDArray[np.bool_]:
+                return self._allowed(places + target, ends + target)
+
+            place = place_of(self._own, candidates, taken, reach, wanted, self._height, allowed)
         except SurfaceError:
             return destination
         return destination if place is wanted else target + place
+
+    def _allowed(self, places: Array, ends: Array) -> NDArray[np.bool_]:
+        """Return whether plans may end at each of ``places`` (n, 3), m: in the box, clear of what is fixed.
+
+        ``ends`` (n, 3) or (3,), m: where the newest plans end, whose heights those in a plane keep.
+        """
+        first = 2 if self._config.planar else 3
+        low, high = self._low[:first] - _ROUNDING_M, self._high[:first] + _ROUNDING_M
+        inside = ((places[:, :first] >= low) & (places[:, :first] <= high)).all(axis=1)
+        if not self._config.obstacles or not inside.any():
+            return np.asarray(inside)
+        if self._config.planar:
+            places = np.column_stack([places[:, :2], np.broadcast_to(ends[..., 2], len(places))])
+        return np.asarray(inside & self._sources.clear_of_fixed(places))
 
     def _beside_goal(self, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
         """Return ``goal`` (3,), m, or the nearest free place if a vehicle that said farewell covers it."""
@@ -72,7 +92,7 @@ class Places:
         if not covered(goal[:2], ends, radii):
             return goal
         for discs in self._sources.resting(epoch, rest, goal, agreements):
-            place = free_place(goal[:2], discs, self._low, self._high)
+            place = free_place(goal[:2], discs, self._low[:2], self._high[:2])
             if place is not None:
                 return np.array([place[0], place[1], goal[2]])
         return goal

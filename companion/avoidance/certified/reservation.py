@@ -94,7 +94,7 @@ class Reservation:
     def watch(self, now: int, *, listens: bool = False) -> None:
         """Note since when (µs) nothing is missing for the reservation of the newest plan, a column.
 
-        ``listens``: with a range, the companion may have heard too little yet of who is within it.
+        ``listens``: with a range, the companion may have heard too little yet of vehicles within it.
         """
         column = self._commitment.column
         if not column or listens or self._agreements.unreserved():

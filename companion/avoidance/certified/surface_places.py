@@ -1,19 +1,20 @@
-"""Places of vehicles on a surface around a target: who is nearer to the surface takes a place first.
+"""Places of vehicles on a surface around a target: the vehicle nearest to the surface takes a place first.
 
 The destination of the paper is the point of the surface nearest to the vehicle (Sec. III-B). Vehicles that
 come from one side have nearly the same one. With planes the first of them stand there, and push the others
 back in the direction of their destinations: these stand in a row behind the first, and slide round the
 surface slowly. So places are assigned. Each vehicle wants the point nearest to where its newest plan ends.
 In the order of the distances between the two, each takes its point, or, where others have places too near,
-the next free place around the vertical through the target. Each vehicle works out all places from the plans
-that it has received. Two that have received other plans may take the same place: that costs time only.
+the next free place around the vertical through the target. Places where no plan may end are not free. Each
+vehicle works out all places from the plans that it has received. Two that have received other plans may take
+the same place: that costs time only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import atan2, hypot
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,14 @@ is kept, and how many there are at most.
 """
 
 
-class Comer(NamedTuple):
+Allowed: TypeAlias = Callable[[Array, Array], NDArray[np.bool_]]
+"""Whether plans may end at each of the places (n, 3), (n,), of candidates whose plans end at (n, 3) or (3,).
+
+All are from the target, m.
+"""
+
+
+class Candidate(NamedTuple):
     """Vehicle that wants a place on its ``surface``.
 
     ``end`` (3,): where its newest plan ends, from the target, m.
@@ -45,7 +53,7 @@ class Comer(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """Place that is taken, from the target, m: nobody else's place is nearer than ``reach`` (m).
+    """Place that is taken, from the target, m: the places of others are at least ``reach`` (m) away.
 
     ``height``: number by which differences in height count in the distance; 0: they do not.
     """
@@ -57,43 +65,56 @@ class Taken(NamedTuple):
 
 def place_of(
     own: int,
-    comers: list[Comer],
+    candidates: list[Candidate],
     taken: list[Taken],
     reach: float,
     nearest: Array,
     height: float = 1.0,
+    allowed: Allowed | None = None,
 ) -> Array:
-    """Return the place (3,), from the target, m, of the vehicle ``own``, one of the ``comers``.
+    """Return the place (3,), from the target, m, of the vehicle ``own``, one of the ``candidates``.
 
     It is ``nearest`` (3,), the point of its surface nearest to where it is now, if that is free, and
     otherwise the free place next to where its newest plan ends. ``taken``: places that are taken by others
-    already. ``reach``, ``height``: those of ``Taken`` for the comers' places. Where no place is free, it is
-    ``nearest`` as well. Raises SurfaceError if the function of a user's surface fails.
+    already. ``reach``, ``height``: those of ``Taken`` for the candidates' places. ``allowed``: which places
+    may be free; None: all. Where no place is free, it is ``nearest`` as well. Raises SurfaceError if the
+    function of a user's surface fails.
     """
     wanted = sorted(
-        zip(comers, _points(comers), strict=True),
+        zip(candidates, _points(candidates), strict=True),
         key=lambda one: (_distance(one[0].end, one[1]) // _EQUALLY_NEAR_M, one[0].system),
     )
-    before = next(row for row, (comer, _) in enumerate(wanted) if comer.system == own)
-    if not taken and _apart([nearest, *(point for _, point in wanted[:before])], reach, height):
+    before = next(row for row, (candidate, _) in enumerate(wanted) if candidate.system == own)
+    first = [nearest, *(point for _, point in wanted[:before])]
+    if not taken and _apart(first, reach, height):
+        ends = [wanted[before][0].end, *(candidate.end for candidate, _ in wanted[:before])]
+        if allowed is None or allowed(np.array(first), np.array(ends)).all():
+            return nearest
+    rules = _Rules(list(taken), reach, allowed)
+    for candidate, point in wanted[:before]:
+        place = _next_free(candidate, point, rules)
+        rules.taken.append(Taken(point if place is None else place, reach, height))
+    candidate, point = wanted[before]
+    if _free(nearest[None], candidate, rules)[0]:
         return nearest
-    found = list(taken)
-    for comer, point in wanted[:before]:
-        place = _next_free(comer.surface, point, found)
-        found.append(Taken(point if place is None else place, reach, height))
-    if not found or _free(nearest[None], found)[0]:
-        return nearest
-    comer, point = wanted[before]
-    place = _next_free(comer.surface, point, found)
+    place = _next_free(candidate, point, rules)
     return nearest if place is None else place
 
 
-def _points(comers: list[Comer]) -> Sequence[Array]:
+class _Rules(NamedTuple):
+    """What decides whether a place is free; ``reach`` (m) of the candidates' places."""
+
+    taken: list[Taken]
+    reach: float
+    allowed: Allowed | None
+
+
+def _points(candidates: list[Candidate]) -> Sequence[Array]:
     """Return the point of its surface nearest to the end of each plan, (3,)."""
-    surface = comers[0].surface
-    if all(one.surface is surface for one in comers):
-        return list(surface.nearest(np.array([one.end for one in comers])))
-    return [one.surface.nearest(one.end) for one in comers]
+    surface = candidates[0].surface
+    if all(one.surface is surface for one in candidates):
+        return list(surface.nearest(np.array([one.end for one in candidates])))
+    return [one.surface.nearest(one.end) for one in candidates]
 
 
 def _apart(points: list[Array], reach: float, height: float) -> bool:
@@ -108,38 +129,46 @@ def _distance(one: Array, two: Array) -> float:
     return float(np.sqrt(off @ off))
 
 
-def _next_free(surface: Surface, point: Array, taken: list[Taken]) -> Array | None:
-    """Return ``point`` (3,) of ``surface`` or the next free place around the vertical; None without one."""
-    if not taken or _free(point[None], taken)[0]:
+def _next_free(candidate: Candidate, point: Array, rules: _Rules) -> Array | None:
+    """Return ``point`` (3,) of the surface or the next free place around the vertical; None without one."""
+    if _free(point[None], candidate, rules)[0]:
         return point
     # On a surface that is round, seen from above, the next free place is beside one that is taken.
-    hidden = [_hidden(point, one) for one in taken]
+    hidden = [_hidden(point, one) for one in rules.taken]
     beside = wrapped(np.array([middle + half for middle, h in hidden for half in (-h, h)]))
-    for turns in (beside, _even(point, taken)):
+    for turns in (beside, _even(point, rules)):
+        if not len(turns):
+            continue
         ordered = turns[np.argsort(np.abs(turns), kind="stable")]
-        places = surface.nearest(_around(point, ordered))
-        free = _free(places, taken)
+        places = candidate.surface.nearest(_around(point, ordered))
+        free = _free(places, candidate, rules)
         if free.any():
             place: Array = places[int(free.argmax())]
             return place
     return None
 
 
-def _even(point: Array, taken: list[Taken]) -> Array:
+def _even(point: Array, rules: _Rules) -> Array:
     """Return angles (n,), rad, in even steps to both sides of ``point`` (3,)."""
-    step = _STEP * max(one.reach for one in taken) / max(hypot(point[0], point[1]), _MIN_RADIUS_M)
+    widest = max((one.reach for one in rules.taken), default=rules.reach)
+    step = _STEP * widest / max(hypot(point[0], point[1]), _MIN_RADIUS_M)
     one_side = step * np.arange(1, _MOST + 1)
     one_side = one_side[one_side <= np.pi]
     return np.concatenate([one_side, -one_side])
 
 
-def _free(points: Array, taken: list[Taken]) -> NDArray[np.bool_]:
-    """Return whether each of ``points`` (n, 3) is free, (n,)."""
-    places = np.array([one.place for one in taken])
-    heights = np.array([(1.0, 1.0, one.height) for one in taken])
-    off = (points[:, None] - places) * heights
-    reach = np.array([one.reach for one in taken]) - _ROUNDING_M
-    return np.asarray((np.vecdot(off, off) >= reach**2).all(axis=1))
+def _free(points: Array, candidate: Candidate, rules: _Rules) -> NDArray[np.bool_]:
+    """Return whether each of ``points`` (n, 3) is free for the ``candidate``, (n,)."""
+    free = np.ones(len(points), dtype=np.bool_)
+    if rules.taken:
+        places = np.array([one.place for one in rules.taken])
+        heights = np.array([(1.0, 1.0, one.height) for one in rules.taken])
+        off = (points[:, None] - places) * heights
+        reach = np.array([one.reach for one in rules.taken]) - _ROUNDING_M
+        free = np.asarray((np.vecdot(off, off) >= reach**2).all(axis=1))
+    if rules.allowed is not None and free.any():
+        free &= rules.allowed(points, candidate.end)
+    return free
 
 
 def _hidden(point: Array, taken: Taken) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import ceil, hypot
 
-from companion.avoidance.certified.margins import fastest, sideways
+from companion.avoidance.certified.margins import fastest, margin, sideways
 from companion.avoidance.certified.plan_sides import plan_sides
 from companion.config import CompanionConfig
 from companion.errors import CompanionError
@@ -35,15 +35,18 @@ def against_range(scenario: Scenario) -> Iterator[str]:
 def _least(scenario: Scenario, settings: CompanionConfig, reach: float) -> float:
     """Return how far (m) radios must reach, at the heights of this scenario.
 
-    Two vehicles within ``reach`` hear each other, also if one of them is on the ground; and who leaves is
-    heard beyond it, or would be counted for ever.
+    Two vehicles within ``reach`` hear each other, also if one of them is on the ground. A vehicle that leaves
+    is heard beyond ``reach``: otherwise it would be counted for ever. The true height of each vehicle differs
+    from the height of its plan by up to a margin.
     """
     certified, limits = settings.certified, settings.limits
     parted = 2e-6 * fastest(limits) * certified.epoch_us
     leaves = reach + 2.0 * sideways(certified, settings.field, limits) + parted
     if settings.planar:
-        heights = places(scenario)[0][:, 2]
-        low, high = float(heights.min()), float(heights.max())
+        starts = places(scenario)[0][:, 2]
+        low, high = float(starts.min()), float(starts.max())
     else:
         low, high = limits.box_min[2], limits.box_max[2]
-    return max(hypot(leaves, high - (low if scenario.airborne else 0.0)), hypot(reach, high))
+    heights = 2.0 * margin(certified, settings.field, limits)
+    apart = high - (low if scenario.airborne else 0.0)
+    return max(hypot(leaves, apart + heights), hypot(reach, high + heights))

@@ -22,6 +22,7 @@ from companion.config import CompanionConfig
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import HorizonConfig, LimitsConfig
 from companion.values.horizon import Array, Motion, roll_out
+from companion.ways.way import Way
 from mavlink_bridge.messages import Message, Source, Tunnel
 from mavlink_bridge.wire.agreements import unpack
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
@@ -33,6 +34,7 @@ CONFIG = CertifiedConfig(dt_us=DT, epoch_us=LENGTH)
 HERE = np.array([0.0, 0.0, 5.0])
 NOBODY = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, dtype=np.bool_))
 seeds = st.integers(0, 2**32 - 1)
+POST = {"kind": "post", "at": [8.0, 0.0], "radius": 1.0, "height": 10.0}
 choices = st.lists(st.sampled_from(["plan", "hold", "wait", "sleep"]), max_size=12)
 
 
@@ -197,6 +199,28 @@ class TestStanding:
             current = flight.commitment.current
             assert current is not None
             assert current.position == stood.position
+
+    @pytest.mark.parametrize("hovers", [False, True])
+    def test_flown_by_another_controller_it_prepares_its_way_at_most_once(
+        self, hovers: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """That is once it has stood for a second, because a preparation takes 0.1 s."""
+        heights: list[float] = []
+        monkeypatch.setattr(Way, "prepare", lambda _way, height: heights.append(height))
+        config = CompanionConfig.model_validate(
+            {"task": "goto", "avoidance": "certified", "planar": True, "way": {}, "obstacles": [POST]}
+        )
+        flight = CertifiedFlight(config, Source(1, 195), FLEET)
+        flight.stand(EPOCH, HERE)
+        assert heights.pop() == HERE[2]
+        place = HERE
+        for step in range(1, 200):
+            moves = not hovers or step % 50 < 25
+            place = place + vector(0.2, 0.0, 0.05) * moves
+            flight.stand(EPOCH + step * 50_000, place)
+        assert len(heights) == hovers
+        if hovers:
+            assert heights[0] == pytest.approx(HERE[2] + 24 * 0.05, abs=CONFIG.tube)
 
     def test_outside_it_stands_where_it_is_but_keeps_to_what_was_told_for_the_epoch(self) -> None:
         flight = self.flight()
