@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.avoidance.certified.margins import between, from_surfaces
-from companion.config.obstacles import Post, Sphere
-from companion.obstacles.boxes import boxes_of
-from companion.values.boxes import distances
+from companion.config.obstacles import Post
+from companion.obstacles.static import FixedObstacles
 from outrider.runs.ground_truth import Array
 from outrider.scenarios.companion_settings import settings_of
 from outrider.scenarios.faults import Vanish
@@ -47,7 +46,13 @@ class CoveredGoals:
         self._ends = {systems.index(end.vehicle): 1e6 * end.at_s for end in ends if end.vehicle in systems}
         self._least, self._near = between(config.certified, config.field, config.limits), near
         self._from_surfaces = from_surfaces(config.certified, config.field, config.limits)
-        self._obstacles = config.obstacles
+        # Plans pass posts as if these had no top.
+        self._fixed = FixedObstacles(
+            [
+                one.model_copy(update={"height": np.inf}) if isinstance(one, Post) else one
+                for one in config.obstacles
+            ]
+        )
         self._seen: dict[int, tuple[int, Array, int]] = {}
         self._places: dict[int, Array] = {}
         self.covered: NDArray[np.bool_] = np.zeros(len(self.lasting), dtype=np.bool_)
@@ -87,16 +92,11 @@ class CoveredGoals:
 
         ``taken`` (M, 2), m: places from which the least distance is kept.
         """
-        boxes = boxes_of(self._obstacles)
         for distance in np.arange(0.0, _FURTHEST * self._least, _STEP_M):
             ring = goal[:2] + distance * np.stack([np.cos(_BEARINGS), np.sin(_BEARINGS)], axis=1)
             free = (np.linalg.norm(ring[:, None] - taken, axis=-1) >= self._least).all(axis=1)
             places = np.column_stack([ring, np.full(len(ring), goal[2])])
-            for one in self._obstacles:
-                if isinstance(one, Post | Sphere):
-                    centre = np.array(one.at if isinstance(one, Sphere) else (*one.at, goal[2]))
-                    free &= np.linalg.norm(places - centre, axis=1) >= self._from_surfaces + one.radius
-            free &= (distances(places, boxes) >= self._from_surfaces).all(axis=1)
+            free &= (self._fixed.distance(places) >= self._from_surfaces).all(axis=1)
             if free.any():
                 return float(distance)
         return 0.0

@@ -148,6 +148,8 @@ def test_no_place_is_outside_the_box_or_near_a_fixed_obstacle(
     for place in found.values():
         assert (place >= np.array(inner.box_min) - 1e-5).all()
         assert (place <= np.array(inner.box_max) + 1e-5).all()
+        assert (fixed.distance(place[None]) >= least - 1e-5).all()
+        # Posts act as if they had no top.
         assert (fixed.distance(np.array([*place[:2], min(place[2], 2.9)])[None]) >= least - 1e-5).all()
     for one, two in combinations(found.values(), 2):
         assert np.linalg.norm(one - two) >= between(config.certified, config.field, config.limits)
