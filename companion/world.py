@@ -70,9 +70,9 @@ class View(NamedTuple):
 def reach(config: CompanionConfig) -> float:
     """Return the largest distance (m) from the own horizon at which an obstacle has an effect.
 
-    It covers the field and the tangential band, both extended for closing at the largest component of v_max.
+    It covers the field and the tangential band, both extended for closing at the largest speed of an axis.
     """
-    field, band, speed = config.field, config.tangential, max(config.limits.v_max)
+    field, band, speed = config.field, config.tangential, max(config.limits.fastest)
     stopping = 0.0 if field.braking is None else speed**2 / (2.0 * field.braking) + field.reaction * speed
     return field.d_safe + field.margin(1) + max(stopping, band.d_band + band.reach_s * speed)
 

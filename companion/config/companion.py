@@ -160,14 +160,14 @@ class CompanionConfig(Settings):
     @model_validator(mode="after")
     def _consistent(self) -> CompanionConfig:
         dt = self.horizon.dt_us * 1e-6
-        least = max(self.limits.v_max[:2]) * dt + max(self.limits.u_max[:2]) * dt**2 / 2
+        least = max(self.limits.fastest[:2]) * dt + max(self.limits.strongest[:2]) * dt**2 / 2
         if self.tangential.d_band <= least:
             raise ValueError(f"tangential.d_band must exceed v_max·dt + u_max·dt²/2 = {least:.2f} m")
         longest = (self.horizon.steps + 1) * self.certified.dt_us
         if self.certified.epoch_us > longest:
             raise ValueError(f"certified.epoch_us must not exceed (N + 1)·certified.dt_us = {longest}")
         for name in ("tangential", "approach_angle"):
-            if name in self.methods and getattr(self, name).force_max <= max(self.limits.u_max):
+            if name in self.methods and getattr(self, name).force_max <= max(self.limits.strongest):
                 raise ValueError(f"{name}.force_max must exceed u_max, or the input cancels it")
         committed = self.avoidance == "certified" and self.planar
         if self.way is not None and self.way.lanes is not None and not committed:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from numbers import Real
 from typing import Annotated, Literal, Self
 
@@ -40,6 +41,16 @@ Bounds = Annotated[
 """Bounds of the three axes, east, north and up; one number is that of each."""
 
 
+Floor = Annotated[float, Field(ge=-100.0, lt=0.0)]
+
+
+Floors = Annotated[
+    tuple[Floor, Floor, Floor],
+    BeforeValidator(_of_each_axis, json_schema_input_type=Floor | tuple[Floor, Floor, Floor]),
+]
+"""Least values of the three axes, all below zero; one number is that of each."""
+
+
 class HorizonConfig(Settings):
     """Horizon of N steps of dt, with N + 1 inputs u(0)…u(N)."""
 
@@ -65,14 +76,17 @@ class CostConfig(Settings):
 class LimitsConfig(Settings):
     """Limits of plans.
 
-    ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it. The box is where vehicles may be: plans keep k·σ
-    of the own position (``field.margin``) from its sides.
+    On each axis u and v have a least and a largest value; without ``u_min`` and ``v_min`` both directions
+    have the same bound. ``a_total`` is the vehicle's: ‖u + f‖ never exceeds it. The box is where vehicles may
+    be: plans keep k·σ of the own position (``field.margin``) from its sides.
     """
 
     u_max: Bounds = Field(
         (2.0, 2.0, 2.0), description="m/s² an axis, of the input u without the field's force"
     )
+    u_min: Floors | None = Field(None, description="m/s² an axis, least value of the input u; null: -u_max")
     v_max: Bounds = Field((5.0, 5.0, 5.0), description="m/s an axis")
+    v_min: Floors | None = Field(None, description="m/s an axis, least velocity; null: -v_max")
     a_total: float = Field(7.0, gt=0.0, le=30.0, description="m/s²; the firefly at 35° of tilt has 6.9")
     j_max: Bounds | None = Field(
         None,
@@ -88,7 +102,34 @@ class LimitsConfig(Settings):
             raise ValueError("box_min must lie below box_max on every axis")
         if self.a_total < max(self.u_max):
             raise ValueError("a_total must be at least the largest u_max")
+        if self.a_total < max(self.strongest):
+            raise ValueError("a_total must be at least the largest -u_min")
         return self
+
+    @property
+    def least_u(self) -> Triple:
+        """Least input on each axis, m/s²: ``u_min``, or −u_max without it."""
+        return _negative(self.u_max) if self.u_min is None else self.u_min
+
+    @property
+    def least_v(self) -> Triple:
+        """Least velocity on each axis, m/s: ``v_min``, or −v_max without it."""
+        return _negative(self.v_max) if self.v_min is None else self.v_min
+
+    @property
+    def strongest(self) -> Triple:
+        """Largest |u| on each axis, m/s², in the direction that allows more."""
+        return _each(max, self.least_u, self.u_max)
+
+    @property
+    def weakest(self) -> Triple:
+        """Largest |u| on each axis, m/s², that both directions allow."""
+        return _each(min, self.least_u, self.u_max)
+
+    @property
+    def fastest(self) -> Triple:
+        """Largest speed on each axis, m/s, in the direction that allows more."""
+        return _each(max, self.least_v, self.v_max)
 
     def within(self, margin: float) -> LimitsConfig:
         """Return the limits with a box that is smaller by ``margin`` (m) on each side.
@@ -103,6 +144,17 @@ class LimitsConfig(Settings):
                 "box_max": tuple(high - by for (_, high), by in zip(sides, off, strict=True)),
             }
         )
+
+
+def _negative(bounds: Triple) -> Triple:
+    x, y, z = bounds
+    return -x, -y, -z
+
+
+def _each(of: Callable[[float, float], float], least: Triple, most: Triple) -> Triple:
+    """Return for each axis the larger or smaller magnitude of its two bounds."""
+    x, y, z = (of(-low, high) for low, high in zip(least, most, strict=True))
+    return x, y, z
 
 
 class Potential(Settings):

@@ -121,7 +121,7 @@ class Guard:
 def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
     """Return a horizon that brakes in a straight line to rest within the horizon's length, then hovers.
 
-    It has N + 1 segments. The deceleration is the smallest of u_max, or more where that does not suffice.
+    It has N + 1 segments. The deceleration is the smallest bound of u, or more where that does not suffice.
     Where even a_total does not stop the vehicle in time, the steps are made longer, because a brake has as
     many steps as a plan. On an axis on which this would go through a wall of the box, the vehicle decelerates
     as much as it takes to stop before it, with a_total at most.
@@ -130,7 +130,7 @@ def brake(now: int, motion: Motion, config: CompanionConfig) -> Horizon:
     speed = float(np.sqrt(motion.velocity @ motion.velocity))
     dt = max(config.horizon.dt_us, 4 * ceil(speed * 250_000 / ((n - 1) * limits.a_total)))
     h = dt * 1e-6
-    rate = max(min(limits.u_max), speed / ((n - 1) * h))
+    rate = max(min(limits.weakest), speed / ((n - 1) * h))
     speeds = np.maximum(0.0, speed - rate * h * np.arange(n + 1))
     direction = motion.velocity / speed if speed > 1e-9 else np.zeros(3)
     accelerations = np.diff(speeds)[:, None] / h * direction

@@ -64,19 +64,23 @@ def lowered(limits: LimitsConfig, profile: Profile, parameters: Mapping[str, flo
     room = _TILT_SHARE * able.tilt_acceleration
     a_total = min(limits.a_total, room)
     u = min(able.acceleration, a_total)
-    speed = min(1.0, able.speed / hypot(*limits.v_max[:2]))
+    speed = min(1.0, able.speed / hypot(*limits.fastest[:2]))
+    up = able.climb if limits.v_min is not None else min(able.climb, able.sink)
+    x, y, z = limits.v_max
     found = limits.model_copy(
         update={
             "u_max": (min(limits.u_max[0], u), min(limits.u_max[1], u), min(limits.u_max[2], a_total)),
-            "v_max": (
-                speed * limits.v_max[0],
-                speed * limits.v_max[1],
-                min(limits.v_max[2], able.climb, able.sink),
-            ),
+            "v_max": (speed * x, speed * y, min(z, up)),
             "a_total": a_total,
             "j_max": _jerk(limits, able),
         }
     )
+    if limits.u_min is not None:
+        x, y, z = limits.u_min
+        found = found.model_copy(update={"u_min": (max(x, -u), max(y, -u), max(z, -a_total))})
+    if limits.v_min is not None:
+        x, y, z = limits.v_min
+        found = found.model_copy(update={"v_min": (speed * x, speed * y, max(z, -able.sink))})
     reported = tuple(
         f"{what} ({' '.join((name, f'{value:g}'))})"
         for what, limit in _changes(limits, found, able)
@@ -106,7 +110,7 @@ def _loop(profile: Profile, able: Limits) -> Loop:
 def _changes(before: LimitsConfig, after: LimitsConfig, able: Limits) -> Iterator[tuple[str, str]]:
     """Yield a text for each limit that is lower in ``after``, and the responsible field of ``able``."""
     push = "acceleration" if able.acceleration < after.a_total else "tilt"
-    climb = "climb" if able.climb < able.sink else "sink"
+    climb = "climb" if able.climb < able.sink or before.v_min is not None else "sink"
     jerks = before.j_max or (inf, inf, inf), after.j_max or (inf, inf, inf)
     for name, unit, was, is_now, limit in (
         ("j_max", "m/s³", max(jerks[0][:2]), max(jerks[1][:2]), "jerk"),
@@ -115,9 +119,22 @@ def _changes(before: LimitsConfig, after: LimitsConfig, able: Limits) -> Iterato
         ("u_max up", "m/s²", before.u_max[2], after.u_max[2], "tilt"),
         ("v_max", "m/s", max(before.v_max[:2]), max(after.v_max[:2]), "speed"),
         ("v_max up", "m/s", before.v_max[2], after.v_max[2], climb),
+        *_changes_of_least(before, after, push),
     ):
-        if is_now < (1.0 - _TOLERANCE) * was:
+        if abs(is_now) < (1.0 - _TOLERANCE) * abs(was):
             yield f"{name} {is_now:.3g} {unit}", limit
+
+
+def _changes_of_least(
+    before: LimitsConfig, after: LimitsConfig, push: str
+) -> Iterator[tuple[str, str, float, float, str]]:
+    """Yield of each least value: name, unit, what it was and is now, and the responsible field."""
+    if before.u_min is not None and after.u_min is not None:
+        yield "u_min", "m/s²", min(before.u_min[:2]), min(after.u_min[:2]), push
+        yield "u_min up", "m/s²", before.u_min[2], after.u_min[2], "tilt"
+    if before.v_min is not None and after.v_min is not None:
+        yield "v_min", "m/s", min(before.v_min[:2]), min(after.v_min[:2]), "speed"
+        yield "v_min up", "m/s", before.v_min[2], after.v_min[2], "sink"
 
 
 def _lacking(able: Limits, autopilot: int, parameters: Mapping[str, float]) -> Iterator[str]:

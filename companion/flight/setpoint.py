@@ -20,7 +20,7 @@ from mavlink_bridge.messages import SetpointLocal, Source
 NO_ACCELERATION: Array = np.zeros(3)
 """No compensation."""
 NO_ACCELERATION.flags.writeable = False
-UNBOUNDED: Array = np.full(3, np.inf)
+UNBOUNDED: Array = np.array([[-np.inf] * 3, [np.inf] * 3])
 UNBOUNDED.flags.writeable = False
 
 
@@ -34,7 +34,7 @@ def setpoint(
     mask: int,
     compensation: Array = NO_ACCELERATION,
     bias: Array = NO_ACCELERATION,
-    v_max: Array = UNBOUNDED,
+    velocities: Array = UNBOUNDED,
     lead: int = 0,
     added: Array = NO_ACCELERATION,
 ) -> SetpointLocal:
@@ -43,16 +43,17 @@ def setpoint(
     It contains the state of ``horizon`` at ``time`` (µs), and ``yaw``. ``since_boot`` (µs): time_boot_ms;
     ``own`` is the sender, and its system id the target's; ``mask`` is POSITION_TARGET_TYPEMASK.
     ``compensation`` (3,), m/s², fleet-local ENU, is added to the acceleration. ``bias`` (3,), m/s, is added
-    to the velocity (see ``tracking.py``); the sum is then clipped on each axis to the larger of ``v_max``
-    (3,) and the planned speed; then ``added`` (3,), m/s, is added (see ``plan_feedforward.py``). The
-    acceleration is that of the horizon ``lead`` µs later.
+    to the velocity (see ``tracking.py``); the sum is then clipped on each axis to the least and largest
+    velocity of ``velocities`` (2, 3), and not below the planned speed; then ``added`` (3,), m/s, is added
+    (see ``plan_feedforward.py``). The acceleration is that of the horizon ``lead`` µs later.
     """
     motion = horizon.at(time)
     acceleration = horizon.at(time + lead).acceleration if lead else motion.acceleration
     velocity = motion.velocity
     if bias is not NO_ACCELERATION:
-        most = np.maximum(np.abs(velocity), v_max)
-        velocity = np.minimum(np.maximum(velocity + bias, -most), most)
+        planned = np.abs(velocity)
+        least, most = np.minimum(-planned, velocities[0]), np.maximum(planned, velocities[1])
+        velocity = np.minimum(np.maximum(velocity + bias, least), most)
     if added is not NO_ACCELERATION:
         velocity = velocity + added
     place, speed, change = local.motion_to_local(motion.position, velocity, acceleration + compensation)

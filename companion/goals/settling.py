@@ -55,7 +55,7 @@ class Settling:
         config, here = self._config, measured.position
         speed = float(np.linalg.norm(measured.velocity))
         if self._rest is None:
-            reach = speed / (2.0 * min(config.limits.u_max))
+            reach = speed / (2.0 * min(config.limits.weakest))
             low, high = np.minimum(config.limits.box_min, here), np.maximum(config.limits.box_max, here)
             self._rest = np.clip(here + reach * measured.velocity, low, high)
         if speed < config.guard.landing_speed:

@@ -393,7 +393,7 @@ class Neighbours:
         ages, states = now - self._times, self._states.copy()
         begun, starts = self._table.starts(self._ids)
         # A plan counts if its sender can have come there since its last position.
-        flown = 1e-6 * np.maximum(begun - self._times, 0) * hypot(*self._config.limits.v_max)
+        flown = 1e-6 * np.maximum(begun - self._times, 0) * hypot(*self._config.limits.fastest)
         planned = (begun > self._times) & (begun <= now)
         planned &= within(starts[:, 0:3], states[:, 0:3], _MAX_PLAN_DEVIATION + flown)
         ages[planned], states[planned] = now - begun[planned], starts[planned]

@@ -2,7 +2,7 @@
 
 The bound: a neighbour affects a vehicle's plan if, at some time within the horizon H, it is nearer than
 ``reach``: the distance at which the field, the tangential band and the field of approach angles act when the
-two close at c, the sum of both speeds. Neither vehicle is faster than v, the norm of ``limits.v_max``, so
+two close at c, the sum of both speeds. Neither vehicle is faster than v, the norm of ``limits.fastest``, so
 c = 2 v. Consider a neighbour at a distance d from the own position, where its state is ``age`` old and the
 own state ``own_age``, and where it may be ``_MAX_PLAN_OFFSET`` off its plan. Until the end of the plans that
 are made within S + P from now, both approach by at most c·(S + P + H) + v·(``age`` + ``own_age``). So it is
@@ -69,7 +69,7 @@ class RelevanceFilter:
 
     def __init__(self, config: CompanionConfig) -> None:
         self._config = config
-        self._max_speed = hypot(*config.limits.v_max)
+        self._max_speed = hypot(*config.limits.fastest)
         self._horizon_s = 1e-6 * config.horizon.dt_us * (config.horizon.steps + 1)
         self._message_gap_s = 2e-6 * max(config.rates.state_us, config.rates.plan_us)
         self._max_age_s = 1e-6 * min(

@@ -57,8 +57,8 @@ class Unheard:
         self._d_min = field.d_min + field.margin(2)
         self._scale = np.array([1.0, 1.0, 1.0 / field.downwash])
         self._planar = config.planar
-        self._braking, self._time = min(limits.u_max), _TIME_S
-        self._reach = Reach(self._braking, self._time, hypot(*limits.v_max))
+        self._braking, self._time = min(limits.weakest), _TIME_S
+        self._reach = Reach(self._braking, self._time, hypot(*limits.fastest))
         # The longest silence (µs) of each neighbour, as far as it is remembered, at the last call.
         self._silences = np.zeros(0)
         self._called = 0

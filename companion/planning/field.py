@@ -176,7 +176,8 @@ class FieldAvoidance:
         if not self._config.shares_surface or not rises or view.own is None:
             return None
         own, horizon = view.own, self._config.horizon
-        velocity = clipped(own.velocity, np.array(self._pilot.planned_limits.v_max))
+        limits = self._pilot.planned_limits
+        velocity = clipped(own.velocity, np.array(limits.least_v), np.array(limits.v_max))
         return roll_out(now, horizon.dt_us, own.position, velocity, np.zeros((horizon.steps + 1, 3)))
 
     def _observe(self, now: int, measured: Motion) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.config.formation import Perception
+from companion.config.planning import LimitsConfig
 from companion.errors import SurfaceError
 from companion.flight.lowering import Lowered
 from companion.flight.state_machine import Pilot
@@ -30,6 +31,11 @@ _NO_MATES, _NO_SIGHT = Mates(), Sight()
 _NO_OBSTACLES = Obstacles((), np.empty((0, 1, 3)), np.empty(0), np.empty(0))
 
 
+def _velocities(limits: LimitsConfig) -> Array:
+    """Return the least and largest velocity (2, 3), m/s."""
+    return np.array([limits.least_v, limits.v_max])
+
+
 class Planning:
     """Planning of one vehicle by ``avoidance``.
 
@@ -45,8 +51,8 @@ class Planning:
         self._heading = Heading(config.heading, config.horizon)
         self._frame: LocalFrame | None = None
         self._lowered = pilot.lowered
-        self.fastest: Array = np.array(config.limits.v_max)
-        """v_max (3,), m/s, as lowered by the autopilot's parameters."""
+        self.velocities: Array = _velocities(config.limits)
+        """Least and largest velocity (2, 3), m/s, as lowered by the autopilot's parameters."""
         self._stepped = 0
         # Times (s) of the steps of a plan, n = 1…N + 1.
         self._ahead: Array = 1e-6 * config.horizon.dt_us * np.arange(1.0, config.horizon.steps + 2.0)
@@ -73,8 +79,8 @@ class Planning:
             avoidance.rest(now, None if view.own is None else view.own.velocity)
             return
         stale = view.own.age > self._config.guard.own_stale_us
-        # A faulty autopilot, or a sender that uses its id, must not cause set-points above v_max.
-        measured = Motion(view.own.position, clipped(view.own.velocity, self.fastest), _ZERO)
+        # A faulty autopilot, or a sender that uses its id, must not cause set-points beyond v_min or v_max.
+        measured = Motion(view.own.position, clipped(view.own.velocity, *self.velocities), _ZERO)
         if not self._pilot.streaming:
             avoidance.rest(now, view.own.velocity)
             stance = self._pilot.stance
@@ -95,7 +101,7 @@ class Planning:
     def _keep(self, lowered: Lowered) -> None:
         """Plan within ``lowered``, the limits that the autopilot can follow."""
         self._lowered = lowered
-        self.fastest = np.array(lowered.limits.v_max)
+        self.velocities = _velocities(lowered.limits)
         self._avoidance.keep(lowered)
 
     def _face(self, now: int, view: View, places: Array) -> None:

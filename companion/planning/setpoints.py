@@ -53,7 +53,7 @@ class Setpoints:
             profile.setpoint_mask,
             tracking.added_acceleration,
             tracking.bias,
-            self._planning.fastest,
+            self._planning.velocities,
             tracking.lead(self._pilot.loop),
             tracking.added_velocity,
         )

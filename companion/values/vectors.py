@@ -15,6 +15,6 @@ def limit(force: Array, bound: float) -> Array:
     return limited
 
 
-def clipped(vector: Array, most: Array) -> Array:
-    """Return ``vector`` with each component clipped to ± that of ``most``."""
-    return np.minimum(np.maximum(vector, -most), most)
+def clipped(vector: Array, least: Array, most: Array) -> Array:
+    """Return ``vector`` with each component clipped to those of ``least`` and ``most``."""
+    return np.minimum(np.maximum(vector, least), most)

@@ -8,6 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from companion.config import CompanionConfig
+from companion.config.planning import LimitsConfig
 
 WRONG = {
     "an unknown key": ({"feild": {"gain": 1.0}}, "feild"),
@@ -18,6 +19,13 @@ WRONG = {
     "d_safe below d_min": ({"field": {"d_min": 2.0, "d_safe": 1.5}}, "d_safe"),
     "a box without inside": ({"limits": {"box_min": (0.0, 0.0, 5.0), "box_max": (1.0, 1.0, 5.0)}}, "box_min"),
     "less than u_max": ({"limits": {"u_max": (3.0, 2.0, 2.0), "a_total": 2.5}}, "a_total"),
+    "less than -u_min": ({"limits": {"u_min": (-3.0, -2.0, -2.0), "a_total": 2.5}}, "a_total"),
+    "a least velocity above zero": ({"limits": {"v_min": (-1.0, -1.0, 0.5)}}, "v_min"),
+    "a least input of zero": ({"limits": {"u_min": 0.0}}, "u_min"),
+    "a force that the least input cancels": (
+        {"limits": {"u_min": -6.5}, "methods": ("tangential",)},
+        "force_max",
+    ),
     "a band that a step skips": ({"tangential": {"d_band": 0.4}}, "d_band"),
     "a tangential force that is cancelled": ({"tangential": {"force_max": 2.0}}, "force_max"),
     "full outside the band": ({"tangential": {"d_full": 4.0}}, "d_full"),
@@ -75,6 +83,17 @@ def test_one_number_bounds_each_axis(bounds: str) -> None:
     for wrong in (True, "4 m/s", 0.0, [4.0, 4.0], {"x": 4.0}):
         with pytest.raises(ValidationError):
             CompanionConfig.model_validate({"limits": {bounds: wrong}})
+
+
+def test_least_values_are_those_of_the_other_direction_unless_stated() -> None:
+    plain = LimitsConfig.model_validate({"u_max": [1.0, 2.0, 3.0], "v_max": 4.0})
+    assert (plain.least_u, plain.least_v) == ((-1.0, -2.0, -3.0), (-4.0, -4.0, -4.0))
+    assert plain.strongest == plain.weakest == plain.u_max
+    stated = {"u_max": [2.0, 2.0, 6.0], "u_min": [-2.0, -3.0, -4.0], "v_max": 2.0, "v_min": -3.0}
+    limits = LimitsConfig.model_validate(stated)
+    assert (limits.least_u, limits.least_v) == ((-2.0, -3.0, -4.0), (-3.0, -3.0, -3.0))
+    assert (limits.strongest, limits.weakest) == ((2.0, 3.0, 6.0), (2.0, 2.0, 4.0))
+    assert limits.fastest == (3.0, 3.0, 3.0)
 
 
 @pytest.mark.parametrize(("avoidance", "planar"), [("field", True), ("certified", False)])

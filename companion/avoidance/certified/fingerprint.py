@@ -52,7 +52,7 @@ def fingerprint(config: CompanionConfig, frame: FleetFrame) -> int:
     certified, field, limits = config.certified, config.field, config.limits
     origin = frame.latitude * _NANO, frame.longitude * _NANO, frame.altitude * _MICRO
     estimate = certified.sigmas, field.position_sigma
-    lengths = field.d_min, certified.tube, certified.drift, *estimate, *limits.v_max
+    lengths = field.d_min, certified.tube, certified.drift, *estimate, *limits.fastest
     numbers = [
         _RULES,
         *(round(number) for number in origin),

@@ -17,8 +17,8 @@ from companion.values.horizon import Array
 
 
 def fastest(limits: LimitsConfig) -> float:
-    """Return the largest speed of a plan, m/s: the norm of v_max."""
-    return sqrt(sum(v * v for v in limits.v_max))
+    """Return the largest speed of a plan, m/s: the norm of the largest speeds of its axes."""
+    return sqrt(sum(v * v for v in limits.fastest))
 
 
 def margin(config: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:

@@ -139,13 +139,15 @@ class SeparationQp:
             (self._gram[: size * size].reshape(size, size).T, self._missing[:size])
             for size in range(most + 1)
         ]
-        self._a_max: Array = np.array(limits.u_max) - _ROUNDED
+        self._a_range: Array = np.array([limits.least_u, limits.u_max])
+        self._a_range += np.array([[_ROUNDED], [-_ROUNDED]])
         if planar:
             # The heights stay almost constant: an interior-point method needs an interior.
-            self._a_max[2] = _ROUNDED
+            self._a_range[:, 2] = -_ROUNDED, _ROUNDED
         self._change: Array = np.full(3, np.inf) if limits.j_max is None else dt * np.array(limits.j_max)
-        v_max = np.array(limits.v_max)
-        self._ranges: Array = np.array([[limits.box_min, limits.box_max], [-v_max, v_max]], dtype=np.float64)
+        self._ranges: Array = np.array(
+            [[limits.box_min, limits.box_max], [limits.least_v, limits.v_max]], dtype=np.float64
+        )
 
     def solve(
         self, state: State, objective: Objective, planes: Planes, region: Array | None = None
@@ -170,7 +172,7 @@ class SeparationQp:
             ranges = ranges.copy()
             ranges[0] = np.maximum(ranges[0, 0], region[0]), np.minimum(ranges[0, 1], region[1])
         known = *state[:3], self.dt, state.committed, ranges
-        known += planes.normals, planes.wanted, self._a_max, self._change, a_min, a_max, of, normals, low
+        known += planes.normals, planes.wanted, self._a_range, self._change, a_min, a_max, of, normals, low
         known += (whose,)
         of_planes, count = rows_within(*known)
         rows = of[:count], normals[:count], low[:count]

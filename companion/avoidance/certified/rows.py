@@ -74,7 +74,8 @@ def _write_row(r: int, of: NDArray[np.int64], c: Array, maps: Array, row: Array)
     array(2),
     array(3),
     *[array(3)] * 2,
-    *[array(1)] * 2,
+    array(2),
+    array(1),
     *[output(2)] * 2,
     output(1, INT),
     output(2),
@@ -90,7 +91,7 @@ def rows_within(
     ranges: Array,
     normals: Array,
     wanted: Array,
-    a_max: Array,
+    a_range: Array,
     change: Array,
     x_min: Array,
     x_max: Array,
@@ -103,13 +104,13 @@ def rows_within(
 
     Returned are the number of rows of planes, which come first, and of all. ``position``, ``velocity`` (3,):
     the state at the beginning; ``before`` (3,): the acceleration until then; ``ranges`` (2, 2, 3): least and
-    largest position and velocity; ``a_max`` (3,); ``change`` (3,): largest change of the acceleration from
-    step to step, ∞ for any. A bound or limit that the ``committed`` accelerations (n, 3) violate is relaxed
-    to what they keep. ``normals``, ``wanted`` (M, n, 3): the planes. Written are the bounds ``x_min``,
-    ``x_max`` (3, n), and arrays of length R ≥ 24n + 3nM: row r is ``c``·y ≥ ``low`` with the result y of
-    number ``of``; ``whose`` (≥ 3nM,) is the number m of the obstacle of a plane. No input changes the first
-    control point of all; it has no rows. The change at the beginning and the one at the end, to rest, are
-    bounds of the first and the last acceleration.
+    largest position and velocity; ``a_range`` (2, 3): least and largest acceleration; ``change`` (3,): its
+    largest change from step to step, ∞ for any. A bound or limit that the ``committed`` accelerations (n, 3)
+    violate is relaxed to what they keep. ``normals``, ``wanted`` (M, n, 3): the planes. Written are the
+    bounds ``x_min``, ``x_max`` (3, n), and arrays of length R ≥ 24n + 3nM: row r is ``c``·y ≥ ``low`` with
+    the result y of number ``of``; ``whose`` (≥ 3nM,) is the number m of the obstacle of a plane. No input
+    changes the first control point of all; it has no rows. The change at the beginning and the one at the
+    end, to rest, are bounds of the first and the last acceleration.
     """
     n = x_min.shape[1]
     a, flown = np.empty((3, n)), np.empty((5 * n, 3))
@@ -117,7 +118,7 @@ def rows_within(
     for axis in range(3):
         for k in range(n):
             a[axis, k] = committed[k, axis]
-            least, most = -a_max[axis], a_max[axis]
+            least, most = a_range[0, axis], a_range[1, axis]
             if k == 0:
                 least, most = max(least, before[axis] - change[axis]), min(most, before[axis] + change[axis])
             if k == n - 1:

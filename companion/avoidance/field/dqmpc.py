@@ -4,7 +4,8 @@ Deviations from the paper. The variable is the total acceleration a = u + f, bec
 on nothing else: f only shifts the bounds, a ∈ [f + u_min, f + u_max]. Gravity is absent: u is relative to
 hover, and the vehicle's controller carries the weight (with g in the dynamics and |u| ≤ 2 the problem has no
 solution). The vehicle's own bound, ‖u + f‖ ≤ a_total, holds for every solution, unless the bounds on jerk
-contradict it: the box of a is cut to |a_i| ≤ |f_i| + u_max,i, scaled down until its corners lie in that ball.
+contradict it: the box of a is cut to −|f_i| + u_min,i ≤ a_i ≤ |f_i| + u_max,i, scaled down until its corners
+lie in that ball.
 
 Box and speed limits have priority over the field: where the bounds shifted by f leave no input that keeps
 them, these bounds are opened (``opening``). A QP that still has no solution is solved without state limits
@@ -44,9 +45,9 @@ class AxisQp(NamedTuple):
 class Problem(NamedTuple):
     """Vectors of the three QPs, (3, n) and (3, 2n).
 
-    They are c, the bounds of a, and the bounds of velocities and positions 1…N + 1. ``far`` (3, n): the
-    largest |a| that the vehicle has on that axis, in either direction: |f| + u_max, scaled to at most a_total
-    in norm. ``flown``: the motion that the plan continues, where jerk is bounded.
+    They are c, the bounds of a, and the bounds of velocities and positions 1…N + 1. ``far_l``, ``far_u`` (3,
+    n): the least and the largest a that the vehicle has on that axis: −|f| + u_min and |f| + u_max, scaled to
+    at most a_total in norm. ``flown``: the motion that the plan continues, where jerk is bounded.
     """
 
     c: Array
@@ -54,7 +55,8 @@ class Problem(NamedTuple):
     x_u: Array
     h_l: Array
     h_u: Array
-    far: Array
+    far_l: Array
+    far_u: Array
     flown: Flown | None = None
 
 
@@ -88,13 +90,13 @@ class Dqmpc:
         self.S_v, self.S_x, _ = prediction(n, dt)
         self.G: Array = np.vstack([self.S_v, self.S_x])
         self._jerk = None if limits.j_max is None else JerkRows(n, dt, np.array(limits.j_max))
-        self._u_max: Array = np.array(limits.u_max)
+        self._u_range: Array = np.array([limits.least_u, limits.u_max])
         ones = np.ones(n)
         self._low, self._high = (
             np.hstack([np.outer(speed, ones), np.outer(place, ones)])
             for speed, place in (
-                (-np.array(limits.v_max), limits.box_min),
-                (np.array(limits.v_max), limits.box_max),
+                (limits.least_v, limits.box_min),
+                (limits.v_max, limits.box_max),
             )
         )
         # [x − x̌, v − v̌] (3, 2) at the end for a = 0, times this, gives c for Ω_t as configured.
@@ -144,6 +146,7 @@ class Dqmpc:
             np.empty((3, 2 * n)),
             np.empty((3, 2 * n)),
             np.empty((3, n)),
+            np.empty((3, n)),
             flown,
         )
         write_vectors(
@@ -152,13 +155,13 @@ class Dqmpc:
             np.ascontiguousarray(f),
             destination,
             velocity,
-            self._u_max,
+            self._u_range,
             self.limits.a_total,
             self.dt,
             omega_scale * self._pull,
             self._low,
             self._high,
-            *found[:6],
+            *found[:7],
         )
         return found
 
@@ -169,7 +172,7 @@ class Dqmpc:
         input keeps even then is widened until some inputs keep it, with a small margin.
         """
         jerk, step, last = _NO_JERK, self.dt, _NO_JERK
-        least, most = -problem.far, problem.far
+        least, most = problem.far_l, problem.far_u
         if self._jerk is not None and problem.flown is not None:
             jerk, last = self._jerk.j_max, problem.flown.acceleration
             step = min(problem.flown.elapsed, self.dt)
@@ -177,7 +180,8 @@ class Dqmpc:
         opened = problem._replace(
             x_l=problem.x_l.copy(), x_u=problem.x_u.copy(), h_l=problem.h_l.copy(), h_u=problem.h_u.copy()
         )
-        open_bounds(least, most, problem.far, self._low, self._high, jerk, self.dt, step, last, *opened[1:5])
+        far = problem.far_l, problem.far_u
+        open_bounds(least, most, *far, self._low, self._high, jerk, self.dt, step, last, *opened[1:5])
         return opened
 
     def axis(self, problem: Problem, axis: int, omega_scale: float) -> AxisQp:

@@ -20,7 +20,8 @@ _TOLERANCE = 1e-7
 _SPARE, _SLOWER, _INSIDE = 0.5, 0.02, 0.05
 """Margins where bounds yield to limits.
 
-They are the share of the largest deceleration that is counted on, m/s below v_max, and m inside the box.
+They are the share of the largest deceleration that is counted on, m/s below the largest speed, and m inside
+the box.
 """
 _WIDEN = 0.01
 """Share of the reachable range by which bounds open more than necessary: PIQP needs an interior."""
@@ -44,6 +45,7 @@ def _late(
     room: float,
     v: float,
     fastest: float,
+    away: float,
     jerk: float,
     dt: float,
     step: float,
@@ -53,8 +55,9 @@ def _late(
     """Write to ``found`` (n,) accelerations as ``pushed`` (n,) until speed or braking distance allow no more.
 
     They point towards a side that is ``room`` m away, approached at ``v`` m/s; ``fastest`` is the largest
-    speed, m/s. Without a bound on ``jerk``, which is then 0, they are not less than ``least`` (n,). With one
-    they continue the acceleration ``last`` within it; ``step`` (s) is the time for the first change.
+    speed towards it, ``away`` that away from it, m/s. Without a bound on ``jerk``, which is then 0, they are
+    not less than ``least`` (n,). With one they continue the acceleration ``last`` within it; ``step`` (s) is
+    the time for the first change.
     """
     n = len(pushed)
     place = room - _INSIDE
@@ -64,7 +67,7 @@ def _late(
         stop = sqrt(2.0 * strong * max(place - lost * max(v, 0.0), 0.0))
         rest = min(fastest, stop) - v
         # A vehicle that moves away from that side too fast must be slowed down first.
-        a = max(pushed[k], (-fastest - v) / dt)
+        a = max(pushed[k], (-away - v) / dt)
         if jerk == 0.0:
             a = max(min(a, rest / dt), least[k])
         else:
@@ -96,11 +99,12 @@ def _share_to_open(missing: Array, room: Array, margin: Array, dt: float, gain: 
     return min(share, 1.0)
 
 
-@kernel(VOID, *[array(2)] * 5, array(1), *[FLOAT] * 2, array(1), *[output(2)] * 4)
+@kernel(VOID, *[array(2)] * 6, array(1), *[FLOAT] * 2, array(1), *[output(2)] * 4)
 def open_bounds(
     reach_l: Array,
     reach_u: Array,
-    far: Array,
+    far_l: Array,
+    far_u: Array,
     lowest: Array,
     highest: Array,
     j_max: Array,
@@ -118,27 +122,29 @@ def open_bounds(
     0. ``lowest``, ``highest`` (3, 2n): limits of velocities and positions. ``flown`` (3,): the acceleration
     that the plan continues, with ``step`` (s) for its first change.
     """
-    n = far.shape[1]
+    n = far_l.shape[1]
     low, high, least, most = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     rows, gain, margin, late = np.empty(2 * n), np.empty(2 * n), np.empty(2 * n), np.empty(n)
     for i in range(3):
         for k in range(n):
             low[k] = min(max(x_l[i, k], reach_l[i, k]), reach_u[i, k])
             high[k] = max(min(x_u[i, k], reach_u[i, k]), reach_l[i, k])
-            least[k] = min(min(max(-far[i, k], reach_l[i, k]), reach_u[i, k]), low[k])
-            most[k] = max(max(min(far[i, k], reach_u[i, k]), reach_l[i, k]), high[k])
+            least[k] = min(min(max(far_l[i, k], reach_l[i, k]), reach_u[i, k]), low[k])
+            most[k] = max(max(min(far_u[i, k], reach_u[i, k]), reach_l[i, k]), high[k])
         # The state that the plan begins with, recovered from the drift in the rows.
         v = lowest[i, 0] - h_l[i, 0]
         x = lowest[i, 2 * n - 1] - h_l[i, 2 * n - 1] - n * dt * v
-        fastest = highest[i, 0] - _SLOWER
+        up, down = highest[i, 0] - _SLOWER, -lowest[i, 0] - _SLOWER
         _rows_of(high, dt, rows)
         if (h_l[i] > rows + _TOLERANCE).any():
-            _late(-high, -most, x - lowest[i, 2 * n - 1], -v, fastest, j_max[i], dt, step, -flown[i], late)
+            room = x - lowest[i, 2 * n - 1]
+            _late(-high, -most, room, -v, down, up, j_max[i], dt, step, -flown[i], late)
             for k in range(n):
                 high[k] = max(high[k], -late[k])
         _rows_of(low, dt, rows)
         if (rows > h_u[i] + _TOLERANCE).any():
-            _late(low, least, highest[i, 2 * n - 1] - x, v, fastest, j_max[i], dt, step, flown[i], late)
+            room = highest[i, 2 * n - 1] - x
+            _late(low, least, room, v, up, down, j_max[i], dt, step, flown[i], late)
             for k in range(n):
                 low[k] = min(low[k], late[k])
         _rows_of(most - least, dt, margin)

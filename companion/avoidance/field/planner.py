@@ -214,7 +214,7 @@ that is about to be hit.
 
 def build(config: CompanionConfig) -> list[Method]:
     """Return the methods that the configuration names, in its order; ``baseline`` adds nothing."""
-    u_max, dt = max(config.limits.u_max), config.horizon.dt_us * 1e-6
+    u_max, dt = max(config.limits.strongest), config.horizon.dt_us * 1e-6
     makers: dict[str, Callable[[], Method]] = {
         "swivel": lambda: Swivel(config.swivel, config.turning_sense),
         "approach_angle": lambda: ApproachAngle(config.approach_angle, config.turning_sense),

@@ -9,6 +9,8 @@ import numpy as np
 from companion.values.compiled import FLOAT, INT, VOID, array, kernel, output
 from companion.values.horizon import Array
 
+_LEFT = 0.1
+"""Share of an axis's inputs that is left at least where the field alone is near a_total."""
 _TOLERANCE = 1e-7
 """Violation of a state limit (m, m/s) that is tolerated: far below what can be measured."""
 
@@ -17,10 +19,11 @@ _TOLERANCE = 1e-7
     VOID,
     *[array(1)] * 2,
     array(2),
-    *[array(1)] * 3,
+    *[array(1)] * 2,
+    array(2),
     *[FLOAT] * 2,
     *[array(2)] * 3,
-    *[output(2)] * 6,
+    *[output(2)] * 7,
 )
 def write_vectors(
     x: Array,
@@ -28,7 +31,7 @@ def write_vectors(
     f: Array,
     destination: Array,
     velocity: Array,
-    u_max: Array,
+    u_range: Array,
     a_total: float,
     dt: float,
     pull: Array,
@@ -39,28 +42,31 @@ def write_vectors(
     x_u: Array,
     h_l: Array,
     h_u: Array,
-    far: Array,
+    far_l: Array,
+    far_u: Array,
 ) -> None:
     """Write the vectors of ``Problem``: c of eq. (2), the bounds of a, (5), and of the states, (6) and (7).
 
-    ``pull`` (2, n) times the errors of position and velocity at the end is c; ``lowest`` and ``highest``
-    (3, 2n) are the limits of velocities and positions.
+    ``u_range`` (2, 3): least and largest input. ``pull`` (2, n) times the errors of position and velocity at
+    the end is c; ``lowest`` and ``highest`` (3, 2n) are the limits of velocities and positions.
     """
     n = len(f)
     if len(x) != 3 or len(v) != 3 or len(destination) != 3 or len(velocity) != 3 or c.shape[1] != n:
         raise ValueError("x, v, destination and velocity have 3 entries, f one row per step")
-    reach = np.empty(3)
+    down, up = np.empty(3), np.empty(3)
     for k in range(n):
         square = 0.0
         for i in range(3):
-            reach[i] = abs(f[k, i]) + u_max[i]
-            square += reach[i] * reach[i]
+            down[i], up[i] = abs(f[k, i]) - u_range[0, i], abs(f[k, i]) + u_range[1, i]
+            reach = max(down[i], up[i])
+            square += reach * reach
         # The box of the inputs is shrunk until its far corner lies in the ball ‖a‖ ≤ a_total.
         scale = min(1.0, a_total / sqrt(square))
         for i in range(3):
-            far[i, k] = reach[i] * scale
-            x_l[i, k] = max(f[k, i] - u_max[i], -far[i, k])
-            x_u[i, k] = min(f[k, i] + u_max[i], far[i, k])
+            far_l[i, k], far_u[i, k] = -down[i] * scale, up[i] * scale
+            width = _LEFT * (u_range[1, i] - u_range[0, i]) * scale
+            x_l[i, k] = min(max(f[k, i] + u_range[0, i], far_l[i, k]), far_u[i, k] - width)
+            x_u[i, k] = max(min(f[k, i] + u_range[1, i], far_u[i, k]), far_l[i, k] + width)
     for i in range(3):
         off_x, off_v = x[i] + n * dt * v[i] - destination[i], v[i] - velocity[i]
         for k in range(n):

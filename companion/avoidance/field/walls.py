@@ -1,15 +1,17 @@
-"""Walls of the box and v_max, held on each axis by the plan that the QPs gave.
+"""Walls of the box and largest speeds, held on each axis by the plan that the QPs gave.
 
 The QPs look only as far as the horizon, and where their constraints contradict each other, as a field that
 turns in an instant can make them, they give up state limits. Here no limit is given up. A plan is amended on
-an axis where it leaves the box or exceeds v_max within the time for which it may be flown, or where its first
-step leads to a state from which the vehicle could not stop before the wall. The plan then moves towards the
-wall no faster than it can stop, and along the wall as the QPs say: the push through the wall is dropped.
+an axis where it leaves the box or exceeds v_min or v_max within the time for which it may be flown, or where
+its first step leads to a state from which the vehicle could not stop before the wall. The plan then moves
+towards the wall no faster than it can stop, and along the wall as the QPs say: the push through the wall is
+dropped.
 
 Near the floor the field itself is turned: what pushes down pushes sideways (``aside``).
 
 Stopping counts on 1/√3 of ``a_total`` at most, which a vehicle has on all axes at once, and never more than
-the larger of u_max and half of ``a_total``. A plan that begins beyond a wall is kept from going further.
+the larger of the bound of u in that direction and half of ``a_total``. A plan that begins beyond a wall is
+kept from going further.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ _LEVEL = 1e-6
 
 
 class Walls:
-    """Walls of the box of ``limits`` and its v_max, for plans in steps of ``dt`` (s).
+    """Walls of the box of ``limits`` and its speeds, for plans in steps of ``dt`` (s).
 
     A plan is flown for ``flown_s`` (s) at most.
     """
@@ -43,10 +45,12 @@ class Walls:
         self._side: Array = np.zeros(2)
         self._checked = ceil(flown_s / dt) + 1
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
-        self._fastest = np.array(limits.v_max)
+        # Of the motions to the high and to the low wall: (2, 3).
+        self._fastest = np.array([limits.v_max, np.negative(limits.least_v)])
         self._a_total, self._dt = limits.a_total, dt
         most = limits.a_total / sqrt(3.0)
-        self._braking: Array = np.minimum(np.maximum(limits.u_max, 0.5 * limits.a_total), most)
+        inputs = np.array([np.negative(limits.least_u), limits.u_max])
+        self._braking: Array = np.minimum(np.maximum(inputs, 0.5 * limits.a_total), most)
         self._jerk = np.zeros(3) if limits.j_max is None else np.array(limits.j_max)
 
     def aside(self, force: Array, heights: Array, velocity: Array, onward: Array) -> Array:
@@ -138,28 +142,33 @@ def _binds(
     v: float,
     low: float,
     high: float,
-    fastest: float,
-    braking: float,
+    fastest: Array,
+    braking: Array,
     jerk: float,
     dt: float,
     checked: int,
     a: Array,
 ) -> bool:
-    """Return whether ``a`` (n,) breaks a limit in ``checked`` steps, or begins with one that will."""
+    """Return whether ``a`` (n,) breaks a limit in ``checked`` steps, or begins with one that will.
+
+    ``fastest``, ``braking`` (2,): of motions to the high and to the low wall.
+    """
     below, above = min(low, x), max(high, x)
-    if not _safe(x - below, -v, -a[0], fastest, braking, jerk, dt):
+    if not _safe(x - below, -v, -a[0], fastest[1], braking[1], jerk, dt):
         return True
-    if not _safe(above - x, v, a[0], fastest, braking, jerk, dt):
+    if not _safe(above - x, v, a[0], fastest[0], braking[0], jerk, dt):
         return True
     for k in range(min(checked, len(a))):
         x += dt * (v + 0.5 * dt * a[k])
         v += dt * a[k]
-        if x < below - _TOLERANCE or x > above + _TOLERANCE or abs(v) > fastest + _TOLERANCE:
+        if x < below - _TOLERANCE or x > above + _TOLERANCE:
+            return True
+        if v > fastest[0] + _TOLERANCE or -v > fastest[1] + _TOLERANCE:
             return True
     return False
 
 
-@kernel(INT, *[array(1)] * 8, *[FLOAT] * 3, INT, output(2))
+@kernel(INT, *[array(1)] * 5, *[array(2)] * 2, array(1), *[FLOAT] * 3, INT, output(2))
 def _keep(
     place: Array,
     velocity: Array,
@@ -175,11 +184,15 @@ def _keep(
     checked: int,
     a: Array,
 ) -> int:
-    """Amend ``a`` (n, 3) as ``Walls.keep`` says; ``step`` (s) is the time for the first change."""
+    """Amend ``a`` (n, 3) as ``Walls.keep`` says; ``step`` (s) is the time for the first change.
+
+    ``speeds``, ``brakings`` (2, 3): of motions to the high and to the low wall.
+    """
     n, amended = len(a), 0
     axis = np.empty(n)
     for i in range(3):
-        x, v, fastest, braking, jerk = place[i], velocity[i], speeds[i], brakings[i], jerks[i]
+        x, v, jerk = place[i], velocity[i], jerks[i]
+        fastest, braking = speeds[:, i], brakings[:, i]
         for k in range(n):
             axis[k] = a[k, i]
         if not _binds(x, v, lowest[i], highest[i], fastest, braking, jerk, dt, checked, axis):
@@ -189,12 +202,13 @@ def _keep(
         last, change = flown[i], jerk * step
         for k in range(n):
             # The braking of three axes at once is within a_total.
-            wanted, least, most = min(max(a[k, i], -braking), braking), -braking, braking
+            least, most = -braking[0], braking[1]
+            wanted = min(max(a[k, i], least), most)
             if jerk > 0.0:
                 wanted = min(max(wanted, last - change), last + change)
                 least, most = max(least, last - change), min(most, last + change)
-            wanted = _slowed(above - x, v, wanted, least, fastest, braking, jerk, dt)
-            wanted = -_slowed(x - below, -v, -wanted, -most, fastest, braking, jerk, dt)
+            wanted = _slowed(above - x, v, wanted, least, fastest[0], braking[0], jerk, dt)
+            wanted = -_slowed(x - below, -v, -wanted, -most, fastest[1], braking[1], jerk, dt)
             a[k, i] = wanted
             x += dt * (v + 0.5 * dt * wanted)
             v += dt * wanted

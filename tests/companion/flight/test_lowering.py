@@ -36,9 +36,11 @@ def vehicles(draw):
 def limits(draw):
     u = draw(st.tuples(*[st.floats(0.2, 5.0)] * 3))
     v = draw(st.tuples(*[st.floats(0.2, 15.0)] * 3))
-    a_total = draw(st.floats(max(u), 20.0))
+    least_u = draw(st.none() | st.tuples(*[st.floats(-5.0, -0.2)] * 3))
+    least_v = draw(st.none() | st.tuples(*[st.floats(-15.0, -0.2)] * 3))
+    a_total = draw(st.floats(max(*u, *(-low for low in least_u or ())), 20.0))
     j = draw(st.none() | st.tuples(*[st.floats(0.5, 30.0)] * 3))
-    return LimitsConfig(u_max=u, v_max=v, a_total=a_total, j_max=j)
+    return LimitsConfig(u_max=u, u_min=least_u, v_max=v, v_min=least_v, a_total=a_total, j_max=j)
 
 
 @pytest.mark.parametrize("flavour", PROFILES)
@@ -72,12 +74,15 @@ def test_plans_stay_within_configuration_and_autopilot(vehicle, asked):
     LimitsConfig.model_validate(kept.model_dump())
     for before, after in ((asked.u_max, kept.u_max), (asked.v_max, kept.v_max)):
         assert all(now <= was for was, now in zip(before, after, strict=True))
+    for before, after in ((asked.least_u, kept.least_u), (asked.least_v, kept.least_v)):
+        assert all(now >= was for was, now in zip(before, after, strict=True))
     assert kept.a_total <= asked.a_total
     assert kept.a_total <= found.acceleration * near
     assert found.acceleration == pytest.approx(0.9 * 9.80665 * math.tan(able.tilt))
-    assert max(kept.u_max[:2]) <= able.acceleration * near
-    assert math.hypot(*kept.v_max[:2]) <= able.speed * near
-    assert kept.v_max[2] <= min(able.climb, able.sink) * near
+    assert max(kept.strongest[:2]) <= able.acceleration * near
+    assert math.hypot(*kept.fastest[:2]) <= able.speed * near
+    assert kept.v_max[2] <= able.climb * near
+    assert -kept.least_v[2] <= able.sink * near
     if able.shaped:
         assert max(kept.j_max[:2]) <= 0.7 * able.jerk * near
     else:
@@ -116,6 +121,16 @@ def test_plans_stay_within_configuration_and_autopilot(vehicle, asked):
 )
 def test_what_is_lowered_is_named_with_its_parameter(profile, parameters, changes):
     assert lowered(SHIPPED, profile, parameters).changes == changes
+
+
+def test_climb_and_descent_are_lowered_apart_where_both_are_stated():
+    asked = SHIPPED.model_copy(update={"v_min": (-2.0, -2.0, -1.0), "u_min": (-2.0, -2.0, -4.0)})
+    parameters = {"WPNAV_SPEED_DN": 80.0, "WPNAV_SPEED_UP": 150.0, "ANGLE_MAX": 2000.0}
+    found = lowered(asked, ARDUPILOT, parameters)
+    assert (found.limits.v_max[2], found.limits.v_min[2]) == (min(SHIPPED.v_max[2], 1.5), -0.8)
+    assert found.limits.u_min[2] == -found.limits.a_total
+    assert "v_min up -0.8 m/s (WPNAV_SPEED_DN 80)" in found.changes
+    assert "u_min up -3.21 m/s² (ANGLE_MAX 2000)" in found.changes
 
 
 def test_jerk_that_is_not_bounded_is_bounded_where_the_firmware_does():

@@ -82,6 +82,17 @@ def test_the_receiver_reads_the_horizon_at_that_time_whatever_its_origin(x, v, a
     assert -math.pi - 1e-6 <= wired.yaw <= math.pi + 1e-6
 
 
+@given(v=vectors(8.0), bias=vectors(4.0))
+def test_a_corrected_velocity_stays_within_least_and_largest_values(v, bias):
+    """Or within the planned speed where that is more."""
+    velocities = np.array([[-1.0, -3.0, -0.5], [2.0, 1.0, 2.0]])
+    horizon = roll_out(EPOCH, 100_000, ZERO, v, np.zeros((16, 3)))
+    message = setpoint(EPOCH, 0, horizon, LEVEL, HOME, OWN, 0, bias=bias, velocities=velocities)
+    found = HOME.velocity_to_fleet(message.velocity)
+    low, high = np.minimum(velocities[0], -np.abs(v)), np.maximum(velocities[1], np.abs(v))
+    np.testing.assert_allclose(found, np.clip(v + bias, low, high), atol=1e-9)
+
+
 def test_it_is_addressed_to_the_own_autopilot():
     message = sent()
     assert (message.target_system, message.target_component, message.frame) == (11, 1, 1)

@@ -199,6 +199,15 @@ def test_an_acceleration_beyond_the_limits_is_found_once(most: int) -> None:
     assert all("2.000 m/s² north, at most 1.999" in finding.figures for finding in verdict.findings)
 
 
+@pytest.mark.parametrize("least", [-1999, -2000])
+def test_so_is_one_below_a_least_value_of_its_own(least: int) -> None:
+    moved = turned(on(A), [(0, -2000, 0), (0, 2000, 0)])
+    terms = TERMS._replace(a_max=(2000, 5000, 2000), a_min=(-2000, least, -2000))
+    verdict = judge(evidence({11: [A, moved, on(moved)], 12: [B, on(B), on(B, 2)]}, terms))
+    assert whats(verdict) == ([] if least == -2000 else ["an acceleration beyond the limits"])
+    assert all("-2.000 m/s² north, at least -1.999" in one.figures for one in verdict.findings)
+
+
 def test_strangers_and_nonsense_are_found_but_not_moving_obstacles() -> None:
     whole = evidence({11: [A], 12: [B], 190: [standing(FAR)], 77: [standing(FAR)]})
     logs = [log for log in whole.logs if log.owner < 77]

@@ -33,10 +33,11 @@ class Terms(NamedTuple):
     ``fleet``: system ids that share committed plans, which are judged; ``apart``: system ids of moving
     obstacles, whose plans are not judged. ``dt``: time between knots (µs); ``epoch``: time between plans
     (µs); ``steps``: number of knots of a plan; ``fleet_identity``: fingerprints in plans and statements;
-    ``required``: least distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²);
-    ``upright``: whether only horizontal distances count; ``further``: what each column adds to the least
-    distance (m); ``downwash``: number by which differences in height are divided; ``surface``: least distance
-    (m) of a plan from the surface of a fixed obstacle; ``reach``: the limited range, if there is one.
+    ``required``: least distance (m) between two plans; ``a_max``: largest acceleration on each axis (mm/s²),
+    and ``a_min`` the least, by default −a_max; ``upright``: whether only horizontal distances count;
+    ``further``: what each column adds to the least distance (m); ``downwash``: number by which differences in
+    height are divided; ``surface``: least distance (m) of a plan from the surface of a fixed obstacle;
+    ``reach``: the limited range, if there is one.
     """
 
     fleet: tuple[int, ...]
@@ -52,6 +53,13 @@ class Terms(NamedTuple):
     downwash: float = 1.0
     surface: float = 0.0
     reach: Reach | None = None
+    a_min: Integers | None = None
+
+
+def milli(values: tuple[float, float, float]) -> Integers:
+    """Return three values in thousandths."""
+    x, y, z = (round(1e3 * value) for value in values)
+    return x, y, z
 
 
 class LoggedPlan(NamedTuple):

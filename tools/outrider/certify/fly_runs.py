@@ -9,7 +9,7 @@ from typing import NamedTuple
 from companion.avoidance.certified.fingerprint import identity
 from companion.avoidance.certified.margins import between, from_surfaces, further
 from companion.config.obstacles import Obstacle
-from outrider.certify.evidence import Terms
+from outrider.certify.evidence import Terms, milli
 from outrider.certify.ranges import reach_of
 from outrider.errors import Fault, InputError
 from outrider.runs import names
@@ -103,7 +103,6 @@ def terms_of_runs(runs: Sequence[FlyRun]) -> Terms:
 
 def _terms(config: FlyConfig) -> Terms:
     companion, certified = config.settings, config.settings.certified
-    x, y, z = (round(1e3 * most) for most in companion.limits.u_max)
     return Terms(
         tuple(sorted(certified.fleet)),
         frozenset(),
@@ -112,10 +111,11 @@ def _terms(config: FlyConfig) -> Terms:
         companion.horizon.steps + 1,
         identity(companion, config.origin.frame),
         between(certified, companion.field, companion.limits),
-        (x, y, z),
+        milli(companion.limits.u_max),
         companion.planar,
         further(certified),
         companion.field.downwash,
         from_surfaces(certified, companion.field, companion.limits),
         reach_of(companion),
+        milli(companion.limits.least_u),
     )

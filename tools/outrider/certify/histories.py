@@ -188,7 +188,9 @@ def _limits(system: int, step: Step, terms: Terms) -> Iterable[Finding]:
     if step.kind is Kind.CARRIED_ON:
         return
     for axis, (name, most) in enumerate(zip(_AXES, terms.a_max, strict=True)):
-        largest = max(abs(a[axis]) for a in step.plan.accelerations)
-        if largest > most:
-            figures = f"{1e-3 * largest:.3f} m/s² {name}, at most {1e-3 * most:.3f}"
+        least = -most if terms.a_min is None else terms.a_min[axis]
+        worst = max((a[axis] for a in step.plan.accelerations), key=lambda a: (max(a - most, least - a), a))
+        if not least <= worst <= most:
+            bound = f"at most {1e-3 * most:.3f}" if worst > most else f"at least {1e-3 * least:.3f}"
+            figures = f"{1e-3 * worst:.3f} m/s² {name}, {bound}"
             yield Finding("an acceleration beyond the limits", (system,), step.plan.epoch, figures)

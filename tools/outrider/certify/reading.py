@@ -33,6 +33,7 @@ from outrider.certify.evidence import (
     Order,
     Terms,
     UnreadablePayloads,
+    milli,
 )
 from outrider.certify.fly_runs import fly_runs, is_of_backup, logs_of, obstacles_of, terms_of_runs
 from outrider.certify.ranges import reach_of
@@ -114,7 +115,6 @@ def terms_of(scenario: Scenario) -> Terms:
     """Return the terms on which the companions of a scenario agree."""
     config = settings_of(scenario)
     certified, limits, origin = config.certified, config.limits, scenario.origin
-    x, y, z = (round(1e3 * most) for most in limits.u_max)
     return Terms(
         certified.fleet,
         frozenset(scenario.moving_systems),
@@ -123,12 +123,13 @@ def terms_of(scenario: Scenario) -> Terms:
         config.horizon.steps + 1,
         identity(config, FleetFrame(origin.latitude, origin.longitude, origin.altitude)),
         between(certified, config.field, limits),
-        (x, y, z),
+        milli(limits.u_max),
         config.planar,
         further(certified),
         config.field.downwash,
         from_surfaces(certified, config.field, limits),
         reach_of(config),
+        milli(limits.least_u),
     )
 
 

@@ -46,7 +46,7 @@ class Demand(NamedTuple):
 def shipped(autopilot: int) -> Demand:
     """Return the demand of the companion file that is shipped for a MAV_AUTOPILOT."""
     limits = load(find("companions", _COMPANION_FILES[autopilot]), FlyConfig).companion.limits
-    return Demand(max(limits.u_max[:2]), max(limits.v_max[:2]), limits.a_total)
+    return Demand(max(limits.strongest[:2]), max(limits.fastest[:2]), limits.a_total)
 
 
 def agility(case: Case) -> Iterator[Finding]:

@@ -103,7 +103,7 @@ def setpoint_check(
     checked, because it jumps when a flight continues after a pilot has turned the vehicle.
     """
     return SetpointCheck(
-        hypot(*limits.v_max), limits.a_total + compensation, inf if heading is None else heading.rate_max
+        hypot(*limits.fastest), limits.a_total + compensation, inf if heading is None else heading.rate_max
     )
 
 

@@ -73,7 +73,7 @@ def _limits(
     bounds.
     """
     limits = config.limits
-    planned = limits.model_copy(update={"a_total": max(hypot(*limits.u_max[:2]), limits.u_max[2])})
+    planned = limits.model_copy(update={"a_total": max(hypot(*limits.strongest[:2]), limits.strongest[2])})
     able = lowered(planned, profile, autopilot.parameters)
     jerk = [change for change in able.changes if change.startswith("j_max")]
     beyond = [able.lacking] if able.lacking else [change for change in able.changes if change not in jerk]
@@ -128,7 +128,7 @@ def _tube(subject: str, config: CompanionConfig, flown: TrackingError | None) ->
             f"{tube:g} m counts, not measured; --fly or --flight LOG measures it",
         )
     text = f"{flown.largest:.2f} m beside the set-points at most, in {flown.seconds:.0f} s of flight"
-    needed = _EXERCISED * max(config.limits.u_max[:2])
+    needed = _EXERCISED * max(config.limits.strongest[:2])
     if flown.acceleration < needed:
         text += f" that is too gentle: {flown.acceleration:.1f} m/s²; needed: {needed:.1f} m/s² at least"
         return Check(subject, "tube", Result.FAIL, text)

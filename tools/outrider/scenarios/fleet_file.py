@@ -17,7 +17,7 @@ from companion.avoidance.certified.fingerprint import fingerprint
 from companion.avoidance.certified.margins import between
 from companion.config import CompanionConfig
 from companion.config.certified import SystemId
-from companion.config.planning import Bounds
+from companion.config.planning import Bounds, Floors
 from companion.values.settings import Positive, Settings, WireStep
 from outrider.errors import Fault, InputError
 from outrider.scenarios.fly_config import FleetOrigin, FlyConfig
@@ -84,6 +84,7 @@ class FleetFile(Settings):
     position_sigma: float = Field(ge=0.0, le=5.0)
     clock_us: int = Field(ge=0, le=100_000)
     v_max: Bounds
+    v_min: Floors | None = Field(None, description="m/s, least velocity on each axis; null: -v_max")
     fleet_time: Literal["own", "measured"]
     reference: SystemId | None
     measured: Measurement
@@ -144,6 +145,7 @@ def settings_of(config: CompanionConfig, origin: FleetOrigin, measured: Measurem
         position_sigma=config.field.position_sigma,
         clock_us=certified.clock_us,
         v_max=config.limits.v_max,
+        v_min=config.limits.v_min,
         fleet_time=certified.fleet_time,
         reference=certified.time_sources.reference,
         measured=measured,
@@ -152,7 +154,9 @@ def settings_of(config: CompanionConfig, origin: FleetOrigin, measured: Measurem
 
 def text_of(file: FleetFile) -> str:
     """Return the text of a fleet file; the same values give the same text."""
-    document = file.model_dump(mode="json", exclude={"fingerprint"})
+    # A line for least velocities only where they are not those of v_max.
+    left_out = {"fingerprint"} if file.v_min else {"fingerprint", "v_min"}
+    document = file.model_dump(mode="json", exclude=left_out)
     body = yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
     return (
         f"# Written by outrider preflight: the settings that the vehicles {', '.join(map(str, file.roster))}"
@@ -215,6 +219,7 @@ def _common(fleet: FleetFile) -> tuple[_Common, ...]:
         _Common(("field", "position_sigma"), fleet.position_sigma),
         _Common(("certified", "clock_us"), fleet.clock_us),
         _Common(("limits", "v_max"), fleet.v_max),
+        _Common(("limits", "v_min"), fleet.v_min),
         _Common(("certified", "fleet_time"), fleet.fleet_time),
         _Common(("certified", "time_sources", "reference"), fleet.reference),
         _Common(("certified", "fleet"), tuple(sorted(fleet.roster))),

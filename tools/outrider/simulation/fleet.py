@@ -90,7 +90,7 @@ class Fleet:
         }
         speed = self.scenario.bystanders[k - self.scenario.vehicles].speed
         if speed is not None:
-            changes["limits"] = config.limits.model_copy(update={"v_max": (speed,) * 3})
+            changes["limits"] = config.limits.model_copy(update={"v_max": (speed,) * 3, "v_min": None})
         return config.model_copy(update=changes)
 
     def target(self) -> Target:

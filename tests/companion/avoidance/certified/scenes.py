@@ -28,6 +28,12 @@ SMOOTH = LimitsConfig(j_max=(2.0, 4.0, 1.0))
 """A bound on jerk that most of the plans here break."""
 
 
+LOPSIDED = LimitsConfig(
+    u_max=(1.0, 2.0, 2.4), u_min=(-1.6, -0.8, -0.8), v_max=(1.2, 0.9, 0.8), v_min=(-0.6, -2.2, -0.5)
+)
+"""Least values that are not those of the other direction, which most of the plans here break."""
+
+
 class Scene(NamedTuple):
     """What one vehicle has to solve: ``start`` is its committed plan."""
 
@@ -144,12 +150,12 @@ def beyond(scene: Scene, accelerations: Array) -> Array:
         [
             planes.ravel(),
             speeds.ravel() - np.tile(limits.v_max, STEPS),
-            -speeds.ravel() - np.tile(limits.v_max, STEPS),
+            np.tile(limits.least_v, STEPS) - speeds.ravel(),
             (limits.box_min - points[:, 1:]).ravel(),
             (points[:, 1:] - limits.box_max).ravel(),
             *_jerks(scene, accelerations),
             accelerations.ravel() - np.tile(limits.u_max, STEPS),
-            -accelerations.ravel() - np.tile(limits.u_max, STEPS),
+            np.tile(limits.least_u, STEPS) - accelerations.ravel(),
         ]
     )
 

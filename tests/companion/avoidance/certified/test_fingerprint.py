@@ -48,6 +48,7 @@ COMMON: dict[str, dict[str, Any]] = {
     "sigma": {"field": {"position_sigma": 0.0201}},
     "speed": {"limits": {"v_max": [5.0, 5.001, 4.0]}},
     "speed of climb": {"limits": {"v_max": [5.0, 5.0, 4.001]}},
+    "speed of descent": {"limits": {"v_min": [-5.0, -5.0, -4.5]}},
     "clocks": {"certified": {"clock_us": 5_001}},
     "own clock": {"certified": {"fleet_time": "own"}},
     "reference": {"certified": {"time_sources": {"reference": 2}}},
@@ -61,6 +62,7 @@ COMMON: dict[str, dict[str, Any]] = {
 }
 OF_ONE: dict[str, dict[str, Any]] = {
     "acceleration": {"limits": {"u_max": [1.0, 1.0, 1.0], "a_total": 6.0}},
+    "slow descent": {"limits": {"v_min": [-5.0, -5.0, -1.0], "u_min": [-2.0, -2.0, -1.0]}},
     "box": {"limits": {"box_min": [-9.0, -9.0, 2.0]}},
     "strangers": {"certified": {"noncooperative_speed": 3.0, "noncooperative_acceleration": 2.0}},
     "cost": {"certified": {"omega_field": 0.1, "spare": 0.02}},

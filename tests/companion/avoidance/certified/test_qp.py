@@ -4,6 +4,7 @@ kept, and no plan that keeps them costs less."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import daqp
 import numpy as np
@@ -12,11 +13,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from companion.avoidance.certified.committed import committed, controls, rests
-from companion.avoidance.certified.qp import Answer
+from companion.avoidance.certified.qp import Answer, Objective, SeparationQp, State
+from companion.config.planning import LimitsConfig
 from companion.errors import CompanionError
 from companion.values.horizon import Array
+from tests.companion.avoidance.certified.plans import STEPS
 from tests.companion.avoidance.certified.scenes import (
     CONFIG,
+    LOPSIDED,
     NARROW,
     SMOOTH,
     WIDE,
@@ -33,7 +37,8 @@ from tests.companion.avoidance.certified.scenes import (
 CLOSE = 1e-5
 """m, m/s, m/s²."""
 seeds = st.integers(0, 2**32 - 1)
-kinds = st.sampled_from([scene, lambda seed: scene(seed, NARROW), lambda seed: scene(seed, SMOOTH), jam])
+bounded = [scene, *(partial(scene, limits=limits) for limits in (NARROW, SMOOTH, LOPSIDED))]
+kinds = st.sampled_from([*bounded, jam])
 
 
 def solved(s: Scene, which: int = 0) -> Answer:
@@ -76,8 +81,7 @@ def test_what_is_committed_of_a_solution_rests_and_is_within_the_limits(
     plan = committed(s.start, solved(s).accelerations)
     assert rests(plan)
     before, after = s.state.committed, plan.accelerations_m_s2
-    most = np.array(s.limits.u_max)
-    low, high = np.minimum(-most, before), np.maximum(most, before)
+    low, high = np.minimum(s.limits.least_u, before), np.maximum(s.limits.u_max, before)
     if s.limits is WIDE:
         assert (after >= low - 1e-9).all()
         assert (after <= high + 1e-9).all()
@@ -111,8 +115,8 @@ def test_of_plans_that_keep_the_same_rows_each_is_the_best_for_its_own_wish(seed
 
 @pytest.mark.parametrize(
     "kind",
-    [scene, lambda seed: scene(seed, NARROW), lambda seed: scene(seed, SMOOTH)],
-    ids=["wide", "narrow", "smooth"],
+    bounded,
+    ids=["wide", "narrow", "smooth", "lopsided"],
 )
 def test_another_solver_with_all_rows_finds_the_same_plan(kind: Callable[[int], Scene]) -> None:
     """Of a problem that is written down anew, by what the motion and the settings say."""
@@ -159,6 +163,37 @@ def test_equal_problems_have_equal_solutions_to_the_last_bit(seed: int, kind: Ca
     assert first.accelerations.tobytes() == second.accelerations.tobytes()
     assert first.forces.tobytes() == second.forces.tobytes()
     assert first.rounds == second.rounds
+
+
+@given(seeds, st.sampled_from([WIDE, NARROW, SMOOTH]))
+def test_the_same_bound_both_ways_is_no_other_problem_to_the_last_bit(
+    seed: int, limits: LimitsConfig
+) -> None:
+    mirrored = {"u_min": limits.least_u, "v_min": limits.least_v}
+    stated = LimitsConfig.model_validate({**limits.model_dump(), **mirrored})
+    one, other = (solved(scene(seed, each)) for each in (limits, stated))
+    assert one.accelerations.tobytes() == other.accelerations.tobytes()
+    assert one.forces.tobytes() == other.forces.tobytes()
+
+
+@given(seeds)
+def test_a_lopsided_problem_in_a_mirror_has_the_mirrored_plan(seed: int) -> None:
+    """Least and largest values change places with their signs."""
+    s = scene(seed, LOPSIDED)
+    low, high = (tuple(-value for value in bounds) for bounds in (LOPSIDED.box_max, LOPSIDED.box_min))
+    turned = LimitsConfig(
+        u_max=tuple(-value for value in LOPSIDED.least_u),
+        u_min=tuple(-value for value in LOPSIDED.u_max),
+        v_max=tuple(-value for value in LOPSIDED.least_v),
+        v_min=tuple(-value for value in LOPSIDED.v_max),
+        box_min=low,
+        box_max=high,
+    )
+    state, wish = State(*(-part for part in s.state)), s.wishes[0]
+    mirrored = Objective(-wish.places, -wish.velocities, -wish.field, wish.moving)
+    planes = s.planes._replace(normals=-s.planes.normals)
+    answer = SeparationQp(STEPS, turned, CONFIG).solve(state, mirrored, planes)
+    np.testing.assert_allclose(-answer.accelerations, solved(s).accelerations, rtol=0.0, atol=2e-3)
 
 
 @given(seeds)

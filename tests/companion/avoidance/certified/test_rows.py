@@ -27,7 +27,7 @@ class Drawn(NamedTuple):
     ranges: Array
     normals: Array
     wanted: Array
-    a_max: Array
+    a_range: Array
     change: Array
 
     def slack(self, a: Array) -> Array:
@@ -71,9 +71,10 @@ def draw(seed: int, n: int, count: int, size: float) -> Drawn:
     ranges = np.sort(size * rng.normal(size=(2, 2, 3)), axis=1)
     normals, wanted = rng.normal(size=(2, count, n, 3))
     state, committed = rng.normal(size=(3, 3)), rng.normal(size=(n, 3))
-    a_max, change = rng.uniform(0.1, 2.0, (2, 3))
+    most, least, change = rng.uniform(0.1, 2.0, (3, 3))
+    a_range = np.stack([-least, most])
     change[rng.uniform(size=3) < 0.5] = np.inf
-    return Drawn(*state, committed, ranges, normals, size * wanted, a_max, change)
+    return Drawn(*state, committed, ranges, normals, size * wanted, a_range, change)
 
 
 def written(drawn: Drawn) -> Rows:
@@ -116,8 +117,8 @@ def test_what_is_left_out_holds_for_all_accelerations_within_their_bounds(
     rows, rng = written(drawn), np.random.default_rng(seed + 1)
     middle = np.zeros((n, 3))
     middle[0] = drawn.before
-    for side, bound in ((-1.0, rows.x_min.T), (1.0, rows.x_max.T)):
-        most = np.tile(drawn.a_max, (n, 1))
+    for side, bound, of in ((-1.0, rows.x_min.T, 0), (1.0, rows.x_max.T, 1)):
+        most = np.tile(side * drawn.a_range[of], (n, 1))
         most[[0, -1]] = np.minimum(most[[0, -1]], side * middle[[0, -1]] + drawn.change)
         np.testing.assert_array_equal(side * bound, np.maximum(most, side * drawn.committed))
     for _ in range(20):

@@ -23,6 +23,19 @@ TIGHT = CompanionConfig.model_validate(
 """Limits so tight that six vehicles that swap places run into all of them."""
 
 DEFAULT = Dqmpc(HorizonConfig(), CostConfig(), LimitsConfig())
+LOPSIDED = LimitsConfig(
+    u_max=(2.0, 1.0, 6.0), u_min=(-1.0, -2.0, -4.0), v_max=(4.0, 1.0, 2.0), v_min=(-1.5, -4.0, -1.0)
+)
+"""Least values that are not those of the other direction: v_z from −1 to 2 m/s, u_z from −4 to 6 m/s²."""
+TURNED = LimitsConfig(
+    u_max=(1.0, 2.0, 4.0),
+    u_min=(-2.0, -1.0, -6.0),
+    v_max=(1.5, 4.0, 1.0),
+    v_min=(-4.0, -1.0, -2.0),
+    box_min=(-20.0, -20.0, -10.0),
+    box_max=(20.0, 20.0, -3.0),
+)
+"""The same in a mirror."""
 A_TOTAL, U_MAX = 7.0, 2.0
 SCALES = st.sampled_from([1.0, 0.1])
 
@@ -167,6 +180,67 @@ def test_without_a_field_a_calm_vehicle_keeps_its_box_and_speed(x, v, destinatio
     assert (np.abs(velocities) <= np.array(limits.v_max) + 1e-6).all()
     assert (positions >= np.array(limits.box_min) - 1e-6).all()
     assert (positions <= np.array(limits.box_max) + 1e-6).all()
+
+
+@LAWS
+@given(
+    x=st.tuples(numbers(-18, 18), numbers(-18, 18), numbers(3.5, 9.5)).map(np.array),
+    v=vectors(0.5),
+    destination=vectors(40.0),
+    scale=SCALES,
+)
+def test_a_calm_vehicle_keeps_least_and_largest_values(x, v, destination, scale):
+    """No acceleration and no velocity of its plan is beyond a bound, in either direction."""
+    dqmpc = Dqmpc(HorizonConfig(), CostConfig(), LOPSIDED)
+    solution = dqmpc.solve(dqmpc.problem(x, v, np.zeros((16, 3)), destination, ZERO, scale), scale)
+    a = solution.acceleration
+    velocities = v + dqmpc.dt * np.cumsum(a, axis=0)
+    assert solution.relaxed == 0
+    assert (a >= np.array(LOPSIDED.least_u) - 1e-9).all()
+    assert (a <= np.array(LOPSIDED.u_max) + 1e-9).all()
+    assert (velocities >= np.array(LOPSIDED.least_v) - 1e-6).all()
+    assert (velocities <= np.array(LOPSIDED.v_max) + 1e-6).all()
+
+
+@LAWS
+@given(x=vectors(60.0), v=vectors(15.0), f=fields(), destination=vectors(60.0), scale=SCALES)
+def test_any_state_is_solved_within_least_and_largest_values(x, v, f, destination, scale):
+    """Inputs stay within their bounds but on axes where the field leaves none that keeps the box."""
+    dqmpc = Dqmpc(HorizonConfig(), CostConfig(), LOPSIDED)
+    problem = dqmpc.problem(x, v, f, destination, ZERO, scale)
+    a = dqmpc.solve(problem, scale).acceleration
+    opened = dqmpc.reachable(problem)
+    presses = ((opened.x_l < problem.x_l) | (opened.x_u > problem.x_u)).any(axis=1)
+    assert (np.linalg.norm(a, axis=1) <= A_TOTAL + 1e-9).all()
+    # Where |f| is near a_total the ball of the vehicle cuts inputs off, down to those that only weaken f.
+    assert (a <= np.maximum(f + LOPSIDED.u_max, 0.0) + 1e-9)[:, ~presses].all()
+    assert (a >= np.minimum(f + LOPSIDED.least_u, 0.0) - 1e-9)[:, ~presses].all()
+    assert ((opened.x_l - 1e-9 <= a.T) & (opened.x_u + 1e-9 >= a.T)).all()
+    assert ((problem.far_l - 1e-9 <= a.T) & (problem.far_u + 1e-9 >= a.T)).all()
+
+
+@LAWS
+@given(x=vectors(60.0), v=vectors(15.0), f=fields(), destination=vectors(60.0), scale=SCALES)
+def test_the_same_bound_both_ways_is_no_other_problem_to_the_last_bit(x, v, f, destination, scale):
+    stated = LimitsConfig(u_min=LimitsConfig().least_u, v_min=LimitsConfig().least_v)
+    other = Dqmpc(HorizonConfig(), CostConfig(), stated)
+    one, two = (
+        each.solve(each.problem(x, v, f, destination, ZERO, scale), scale) for each in (DEFAULT, other)
+    )
+    np.testing.assert_array_equal(one.acceleration, two.acceleration)
+    assert one.relaxed == two.relaxed
+
+
+@LAWS
+@given(x=vectors(60.0), v=vectors(15.0), f=fields(), destination=vectors(60.0), scale=SCALES)
+def test_least_and_largest_values_change_places_in_a_mirror(x, v, f, destination, scale):
+    """Also where bounds are opened and limits widened: each side has its own bounds."""
+    one, two = (Dqmpc(HorizonConfig(), CostConfig(), limits) for limits in (LOPSIDED, TURNED))
+    found = one.reachable(one.problem(x, v, f, destination, ZERO, scale))
+    turned = two.reachable(two.problem(-x, -v, -f, -destination, ZERO, scale))
+    for low, high in (("x_l", "x_u"), ("h_l", "h_u"), ("far_l", "far_u")):
+        np.testing.assert_allclose(getattr(turned, low), -getattr(found, high), atol=1e-9)
+        np.testing.assert_allclose(getattr(turned, high), -getattr(found, low), atol=1e-9)
 
 
 @LAWS

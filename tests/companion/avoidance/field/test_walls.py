@@ -1,4 +1,4 @@
-"""Whatever others do, no plan of the field leaves the box or exceeds v_max, on any axis."""
+"""Whatever others do, no plan of the field leaves the box or its range of speeds, on any axis."""
 
 from __future__ import annotations
 
@@ -19,6 +19,18 @@ STEPS, DT = 16, 100_000
 CONFIGS = {
     "paper": CompanionConfig(),
     "slow": CompanionConfig.model_validate({"limits": {"v_max": (2.0, 2.0, 1.0)}}),
+    "lopsided": CompanionConfig.model_validate(
+        {
+            "limits": {
+                "u_max": (2.0, 2.0, 6.0),
+                "u_min": (-2.0, -3.0, -4.0),
+                "v_max": (2.0, 1.0, 2.0),
+                "v_min": (-1.0, -3.0, -0.5),
+                "a_total": 8.0,
+            },
+            "tangential": {"force_max": 7.0},
+        }
+    ),
     "shipped": CompanionConfig.model_validate(shipped("ardupilot")),
 }
 PERIODS = st.sampled_from([20_000, 50_000, 100_000])
@@ -53,10 +65,11 @@ class Adversaries:
 
 @QUICK
 @given(seed=st.integers(0, 2**32 - 1), name=st.sampled_from(sorted(CONFIGS)), period=PERIODS)
-def test_no_neighbours_press_a_plan_through_a_wall_or_beyond_v_max(seed, name, period):
+def test_no_neighbours_press_a_plan_through_a_wall_or_beyond_its_speeds(seed, name, period):
     config = CONFIGS[name]
     limits = config.limits.within(config.field.margin(1))
-    low, high, fastest = (np.array(one) for one in (limits.box_min, limits.box_max, limits.v_max))
+    low, high = np.array(limits.box_min), np.array(limits.box_max)
+    slowest, fastest = np.array(limits.least_v), np.array(limits.v_max)
     chance, adversaries = np.random.default_rng(seed), Adversaries(config, seed)
     planner, horizon, now = Planner(config), None, 0
     position, velocity, acceleration = np.append(ZERO[:2], chance.uniform(low[2], low[2] + 5.0)), ZERO, ZERO
@@ -69,7 +82,8 @@ def test_no_neighbours_press_a_plan_through_a_wall_or_beyond_v_max(seed, name, p
         position, velocity, acceleration = horizon.at(now)
         assert (position >= low - 1e-6).all()
         assert (position <= high + 1e-6).all()
-        assert (np.abs(velocity) <= fastest + 2e-6).all()
+        assert (velocity >= slowest - 2e-6).all()
+        assert (velocity <= fastest + 2e-6).all()
         assert np.linalg.norm(acceleration) <= limits.a_total * (1.0 + 1e-6)
 
 
@@ -78,17 +92,20 @@ def test_no_neighbours_press_a_plan_through_a_wall_or_beyond_v_max(seed, name, p
     room=vectors(7.0),
     velocity=vectors(5.0),
     pushes=st.lists(vectors(7.0), min_size=STEPS, max_size=STEPS),
-    name=st.sampled_from(["paper", "slow"]),
+    name=st.sampled_from(["paper", "slow", "lopsided"]),
 )
 def test_any_push_is_held_where_the_vehicle_can_stop(room, velocity, pushes, name):
     """In any corner of the box, ``room`` from its walls: their signs choose the corner."""
     limits = CONFIGS[name].limits
-    fastest, braking = np.array(limits.v_max), limits.a_total / np.sqrt(3.0)
+    slowest, fastest = np.array(limits.least_v), np.array(limits.v_max)
+    braking = np.minimum(np.maximum(limits.weakest, 0.5 * limits.a_total), limits.a_total / np.sqrt(3.0))
     low, high = np.array(limits.box_min), np.array(limits.box_max)
     position = np.clip(np.where(room < 0.0, high + room, low + room), low, high)
     room = np.where(velocity < 0.0, position - low, high - position)
     assume(
-        (velocity**2 / braking + 0.2 * np.abs(velocity) <= room).all() and (np.abs(velocity) <= fastest).all()
+        (velocity**2 / braking + 0.2 * np.abs(velocity) <= room).all()
+        and (velocity <= fastest).all()
+        and (velocity >= slowest).all()
     )
     pushed = np.array(pushes)
     pushed *= limits.a_total / np.maximum(np.linalg.norm(pushed, axis=1, keepdims=True), limits.a_total)
@@ -97,7 +114,8 @@ def test_any_push_is_held_where_the_vehicle_can_stop(room, velocity, pushes, nam
     knots = roll_out(0, DT, position, velocity, kept).knots
     assert (knots[:, 0:3] >= np.array(limits.box_min) - 1e-5).all()
     assert (knots[:, 0:3] <= np.array(limits.box_max) + 1e-5).all()
-    assert (np.abs(knots[:, 3:6]) <= fastest + 1e-5).all()
+    assert (knots[:, 3:6] <= fastest + 1e-5).all()
+    assert (knots[:, 3:6] >= slowest - 1e-5).all()
     assert np.linalg.norm(kept, axis=1).max() <= limits.a_total + 1e-9
     assert (amended > 0) == (kept != pushed).any()
 
