@@ -140,7 +140,8 @@ class FusedTarget:
         known = self._known(now)
         if known is None:
             return None
-        return State(known.position, known.velocity, now - known.time, worst_sigma(known.covariance))
+        age, sigma = now - known.time, worst_sigma(known.covariance)
+        return State(known.position, known.velocity, age, sigma, known.turn_rate)
 
     def fresh(self, state: State | None) -> State | None:
         """Return ``state``, or None if it is older than ``guard.target_stale_us``."""

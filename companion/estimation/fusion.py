@@ -19,10 +19,13 @@ from companion.config.target_source import FusedSource, OwnErrors
 from companion.estimation.detections import Detection
 from companion.estimation.fusion_filter import (
     ADAPTED,
+    AGREE_M,
+    AGREE_M_S,
     FIELDS,
     GROUPS,
     MARKS,
     PER_VEHICLE,
+    SENSITIVITY,
     TARGET,
     ahead,
     replay,
@@ -37,33 +40,33 @@ _WINDOW_SHARE = 2
 """Detections of at least the window, and of this many windows at most, are kept."""
 _REMEMBERED = 16
 """Number of detections of each vehicle that passed and are remembered for longer than the window."""
-_RESTART_US, _WITNESSES, _AGREE_M, _AGREE_M_S = 1_000_000, 3, 2.0, 3.0
-"""After this time without a passing detection so many refused ones restart the filter that agree.
-
-They agree if the places differ by at most a length plus a speed times the time between.
-"""
+_RESTART_US, _WITNESSES = 1_000_000, 3
+"""After this time without a passing detection so many refused ones restart the filter that agree."""
 
 
 class Belief(NamedTuple):
     """What is known of the target: ``position`` (3,) m, ``velocity`` (3,) m/s, fleet-local ENU.
 
-    ``covariance`` (3, 3): of the position; ``time`` (µs): of the image of the last detection that passed.
+    ``covariance`` (3, 3): of the position; ``time`` (µs): of the image of the last detection that passed;
+    ``turn_rate`` (rad/s): rate of change of the course, counter-clockwise seen from above.
     """
 
     time: int
     position: Array
     velocity: Array
     covariance: Array
+    turn_rate: float = 0.0
 
 
 class Seen(NamedTuple):
-    """Number of a vehicle's detections, and the mean of their w_k (1/m²)."""
+    """Number of a vehicle's detections, and the median of their w_k (1/m²).
+
+    w_k is computed with the measured distance: in a mean a false detection nearby that passed would weigh
+    as much as ten others.
+    """
 
     number: int
     weight: float
-
-
-_UNSEEN = Seen(0, 0.0)
 
 
 class Fusion:
@@ -144,12 +147,15 @@ class Fusion:
         x, P, memory = self._states[count - 1], self._covariances[count - 1], self._memories[count - 1]
         # Before the last detection, the state is that at it.
         elapsed = max(time - int(self._times[count - 1]), 0)
-        state, covariance = np.empty(6), np.empty((3, 3))
+        state, covariance = np.empty(TARGET), np.empty((3, 3))
         ahead(1e-6 * elapsed, 1e-6 * min(elapsed, longest), x, P, memory, self._noise, state, covariance)
         # An error of the images' times moves the place along the velocity.
         along = self._time_sigma * x[3:6]
         covariance += np.outer(along, along)
-        return Belief(passed, state[:3], state[3:], covariance)
+        # (v × a)/v², smaller where the velocity is mostly noise.
+        vx, vy, _, ax, ay, _ = state[3:].tolist()
+        rate = (vx * ay - vy * ax) / (vx * vx + vy * vy + float(P[3, 3] + P[4, 4]))
+        return Belief(passed, state[:3], state[3:6], covariance, rate)
 
     def recent(self, since: int) -> dict[int, Seen]:
         """Return the detections of images from ``since`` (µs) on that passed, by vehicle.
@@ -160,21 +166,25 @@ class Fusion:
         count = len(self._detections)
         rows = slice(int(self._times[:count].searchsorted(since)), count)
         used = self._used[rows]
-        vehicles = self._vehicles[rows][used]
-        numbers = np.bincount(vehicles)
-        sums = np.bincount(vehicles, self._weights[rows][used])
-        found = {
-            system: Seen(number, total / number)
-            for system, (number, total) in enumerate(zip(numbers.tolist(), sums.tolist(), strict=True))
-            if number
-        }
+        vehicles, weights = self._vehicles[rows][used], self._weights[rows][used]
         if count and since < int(self._times[0]):
-            for system, earlier in self._earlier.items():
-                weights = [weight for time, weight in earlier if time >= since]
-                if weights:
-                    number, mean = found.get(system, _UNSEEN)
-                    total = number + len(weights)
-                    found[system] = Seen(total, (number * mean + sum(weights)) / total)
+            older = [
+                (system, weight)
+                for system, earlier in self._earlier.items()
+                for time, weight in earlier
+                if time >= since
+            ]
+            if older:
+                vehicles = np.concatenate([[system for system, _ in older], vehicles])
+                weights = np.concatenate([[weight for _, weight in older], weights])
+        order = weights.argsort()
+        ordered = weights[order[vehicles[order].argsort(kind="stable")]].tolist()
+        found, first = {}, 0
+        for system, number in enumerate(np.bincount(vehicles).tolist()):
+            if number:
+                low, high = first + (number - 1) // 2, first + number // 2
+                found[system] = Seen(number, 0.5 * (ordered[low] + ordered[high]))
+                first += number
         return found
 
     @property
@@ -202,7 +212,8 @@ class Fusion:
         """Return the filter's memory before the first detection: the configured accelerations, no errors."""
         level, upward = self._accelerations
         memory = np.zeros(ADAPTED + MARKS * len(self._slots))
-        sensitivity = memory[ADAPTED - GROUPS * TARGET * TARGET : ADAPTED].reshape(GROUPS, TARGET, TARGET)
+        size = GROUPS * TARGET * TARGET
+        sensitivity = memory[SENSITIVITY : SENSITIVITY + size].reshape(GROUPS, TARGET, TARGET)
         sensitivity[0, 6, 6] = sensitivity[0, 7, 7] = level
         sensitivity[1, 8, 8] = upward
         return memory
@@ -312,7 +323,7 @@ class Fusion:
     @staticmethod
     def _agree(one: Detection, other: Detection) -> bool:
         apart = float(np.linalg.norm(one.fields[:3] - other.fields[:3]))
-        return apart <= _AGREE_M + _AGREE_M_S * 1e-6 * abs(one.time - other.time)
+        return apart <= AGREE_M + AGREE_M_S * 1e-6 * abs(one.time - other.time)
 
 
 def _order(one: Detection) -> tuple[int, int]:

@@ -11,8 +11,10 @@ The variance of the acceleration, one of both horizontal axes and one of the ver
 configured one. θ has a normal prior around 0 and follows the innovations y by recursive maximum likelihood
 with exponential forgetting. With S = cov y, u = S⁻¹y and the sensitivity D = ∂P/∂θ of the target's
 covariance, the score is ½(uᵀDu − tr S⁻¹D) and its information ½ tr (S⁻¹D)². In D the target's correlation
-with the vehicles' errors is left out. The σ of the acceleration is at least ``LEAST_SHARE`` of the configured
-one, because innovations of a straight walk say nothing of the next corner.
+with the vehicles' errors is left out. A refused detection counts only if another one that was refused shortly
+before agrees with it: false ones do not agree, those of a target that turned do. The σ of the acceleration is
+at least ``LEAST_SHARE`` of the configured one, because innovations of a straight walk say nothing of the next
+corner.
 """
 
 from __future__ import annotations
@@ -45,9 +47,14 @@ each of the five errors of a vehicle.
 """
 GROUPS = 2
 """Number of variances of the acceleration."""
-_INFORMATION, _SENSITIVITY = GROUPS, 2 * GROUPS
-ADAPTED = _SENSITIVITY + GROUPS * TARGET * TARGET
-"""Numbers of ``memory`` before those of the vehicles: each θ, its information, and its D (TARGET, TARGET)."""
+_INFORMATION, SENSITIVITY = GROUPS, 2 * GROUPS
+_REFUSED = SENSITIVITY + GROUPS * TARGET * TARGET
+ADAPTED = _REFUSED + 4
+"""Numbers of ``memory`` before those of the vehicles.
+
+Each θ, its information, and its D (TARGET, TARGET); the seconds for which the last refused detection can
+still be confirmed, and its place (3), m.
+"""
 MARKS = 8
 """Numbers of ``memory`` of each vehicle.
 
@@ -78,6 +85,11 @@ limits.
 """
 _GAIN = 0.999
 """An estimate by others is used if it lowers the trace to less than this share."""
+_CONFIRMED_S = 0.5
+"""A refused detection says something of the acceleration if the one refused before it, at most this time (s)
+earlier, agrees with it."""
+AGREE_M, AGREE_M_S = 2.0, 3.0
+"""Detections agree if the places differ by at most a length plus a speed times the time between."""
 MEMORY = 0.1
 """Weight of a detection in the mean d² of its vehicle."""
 SUSPECT = 2.0
@@ -199,6 +211,18 @@ def _own_share(P: Array, R: Array) -> float:
 
 
 @part
+def _confirmed(memory: Array, row: Array) -> bool:
+    """Return whether a refused detection ``row`` (FIELDS,) agrees with the last one, and remember it."""
+    left, square = memory[_REFUSED], 0.0
+    for a in range(3):
+        square += (row[a] - memory[_REFUSED + 1 + a]) ** 2
+        memory[_REFUSED + 1 + a] = row[a]
+    memory[_REFUSED] = _CONFIRMED_S
+    apart = AGREE_M + AGREE_M_S * (_CONFIRMED_S - left)
+    return left > 0.0 and square <= apart * apart
+
+
+@part
 def _adapt(
     memory: Array, D: Array, group: int, u: Array, T: Array, clip: float, keep: float, noise: Array
 ) -> None:
@@ -277,7 +301,7 @@ def replay(
             X[i], PP[i], memories[i] = X[i - 1], PP[i - 1], memories[i - 1]
             elapsed = times[i] - times[i - 1]
         x, P, memory = X[i], PP[i], memories[i]
-        DD = memory[_SENSITIVITY:ADAPTED].reshape((GROUPS, TARGET, TARGET))
+        DD = memory[SENSITIVITY:_REFUSED].reshape((GROUPS, TARGET, TARGET))
         dt = 1e-6 * elapsed
         if elapsed > 0:
             _motion(dt, noise[_DECAY], F, Q)
@@ -293,6 +317,7 @@ def replay(
                 variance = noise[_VARIANCES + group] * exp(memory[group])
                 _disturb(P, a, Q, variance)
                 _disturb(DD[group], a, Q, variance)
+            memory[_REFUSED] -= dt
             for k in range(vehicles):
                 memory[ADAPTED + MARKS * k + 1] += dt
         slot = slots[i]
@@ -365,8 +390,11 @@ def replay(
             before = memory[mark] if memory[mark] > 0.0 else DEGREES_OF_FREEDOM
             memory[mark] = before + MEMORY * (min(d2, noise[_GATE]) - before)
             trusted = number == 0 or memory[mark] <= SUSPECT * max(DEGREES_OF_FREEDOM, others / number)
+            says = trusted
+            if d2 > noise[_GATE]:
+                says = trusted and _confirmed(memory, data[i])
             passes = passes and trusted
-            if trusted and noise[_BOUND] > 0.0:
+            if says and noise[_BOUND] > 0.0:
                 clip = min(1.0, noise[_GATE] / max(d2, 1e-9))
                 for group in range(GROUPS):
                     _adapt(memory, DD[group], group, u, T, clip, exp(-dt * noise[_FORGET]), noise)
@@ -412,7 +440,7 @@ def replay(
 def ahead(
     dt: float, moving: float, x: Array, P: Array, memory: Array, noise: Array, state: Array, covariance: Array
 ) -> None:
-    """Write what is known ``dt`` s after a detection: ``state`` (6,), and ``covariance`` (3, 3) of the place.
+    """Write what is known ``dt`` s after a detection: ``state`` (9,), and ``covariance`` (3, 3) of the place.
 
     ``x`` (n,), ``P`` (n, n), ``memory``: after it. The target moves for ``moving`` s and rests then.
     """
@@ -422,6 +450,7 @@ def ahead(
     for a in range(3):
         state[a] = x[a] + F[0] * x[3 + a] + F[1] * x[6 + a]
         state[3 + a] = 0.0 if rests else x[3 + a] + F[2] * x[6 + a]
+        state[6 + a] = 0.0 if rests else F[3] * x[6 + a]
     C[:] = P[:TARGET, :TARGET]
     _motion(dt, noise[_DECAY], F, Q)
     _advance(C, F)

@@ -35,6 +35,8 @@ from sitl.vehicle.config import VehicleConfig
 Array = NDArray[np.float64]
 AHEAD_US, FROM_US = 100_000, 2_000_000
 """An estimate is compared so long after each image, from so long after the start on."""
+SETTLED_S = 20.0
+"""Bearings are judged from so long after the start on; in a shorter flight the last two seconds."""
 _COARSE_PIXELS, _FINE_PIXELS, _RANGE_M = 8.0, 4.6, 0.6
 """σ (pixels) of cameras of which one has three times the w_k of the others: σ² 2.98 to 1, rays 7.8 m long."""
 _FOCAL_PIXELS = 640.0 / tan(radians(35.0))
@@ -115,8 +117,9 @@ class Figures(NamedTuple):
     ``fused``, ``single`` (m): RMSE of all cameras together and of the best one; ``nees`` of three and its
     degrees of freedom ``freedom``, ``level`` and ``height`` NEES of the horizontal plane (two) and of the
     height (one); ``jump`` (m): largest change of the error from one image to the next;
-    ``bearings``: |s|/Σw over the last two seconds; ``angle`` (deg): between the first two vehicles, at the
-    end; ``separation`` (m): least distance of two vehicles at any time.
+    ``bearings``: |s|/Σw in the two seconds from 20 s after the start on, ``further``: from then to the end;
+    ``angle`` (deg): between the first two vehicles, in these two seconds; ``separation`` (m): least distance
+    of two vehicles at any time.
     """
 
     fused: float
@@ -127,6 +130,7 @@ class Figures(NamedTuple):
     height: float
     jump: float
     bearings: float
+    further: float
     angle: float
     separation: float
 
@@ -228,7 +232,8 @@ def figures(case: str, sensors: str, seed: int, seconds: float) -> Figures:
     off, covariances = errors(heard, samples)
     alone = [errors(heard, samples, system)[0] for system in scenario.systems[: scenario.vehicles]]
     mean, freedom = nees(off, covariances)
-    late = samples.time >= samples.time[-1] - FROM_US
+    since = samples.time - samples.time[-1] + 1e6 * max(seconds - SETTLED_S, 1e-6 * FROM_US)
+    further, late = since >= 0.0, (since >= 0.0) & (since <= FROM_US)
     quality, _ = bearings_quality(scenario, samples)
     end = samples.position[late][:, :2] - samples.target[late][:, None]
     angles = np.degrees(np.arctan2(end[..., 1], end[..., 0]))
@@ -242,6 +247,7 @@ def figures(case: str, sensors: str, seed: int, seconds: float) -> Figures:
         nees(off[:, 2:], covariances[:, 2:, 2:])[0],
         float(np.linalg.norm(np.diff(off, axis=0), axis=1).max()),
         float(quality[late].mean()),
+        float(quality[further].mean()),
         float(np.abs(apart).mean()),
         float(samples.separation.min()),
     )
@@ -293,7 +299,7 @@ def _said(row: Figures) -> str:
     return (
         f"fused {row.fused:.4f} m, single {row.single:.4f} m, ratio {row.fused / row.single:.3f},"
         f" NEES {row.nees:.2f} (ν {row.freedom:.0f}, plane {row.level:.2f}, height {row.height:.2f}),"
-        f" jump {row.jump:.3f} m, |s|/Σw {row.bearings:.3f},"
+        f" jump {row.jump:.3f} m, |s|/Σw {row.bearings:.3f}, further {row.further:.3f},"
         f" angle {row.angle:.1f}°, separation {row.separation:.2f} m"
     )
 

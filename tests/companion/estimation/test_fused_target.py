@@ -101,6 +101,22 @@ def test_own_detections_and_forwarded_ones_are_dated_by_the_image():
     assert of.target.last(now).position == pytest.approx(PLACE, abs=0.1)
 
 
+@pytest.mark.parametrize("rate", [0.6, -0.6])
+def test_the_state_turns_as_the_target_does(rate):
+    """It walks round a circle at 1.5 m/s; two cameras know about half of its acceleration."""
+    exact = {"sigma_horizontal": 0.02, "sigma_vertical": 0.02, "sigma_yaw_deg": 0.1, "sigma_tilt_deg": 0.1}
+    of = world(own_errors=exact)
+    for tick in range(50):
+        now = START + 1_000_000 + 100_000 * tick
+        heard(of, now)
+        angle = rate * 0.1 * tick
+        place = 2.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        give(of, now + 1_000, "autopilot", own_detection(now - START, place))
+        give(of, now + 2_000, "swarm", forwarded(now - START, place))
+    assert 0.3 < of.target.last(now + 2_000).turn_rate / rate < 1.2
+    assert of.at(now + 2_000).target.turn_rate == of.target.last(now + 2_000).turn_rate
+
+
 def test_without_the_time_of_the_image_it_is_as_old_as_configured():
     of, now = started(latency_us=300_000)
     give(of, now, "autopilot", own_detection(0)[1:])

@@ -293,6 +293,45 @@ def test_false_detections_make_no_jump():
                 assert np.linalg.norm(a.position - b.position) < 1.0
 
 
+def adapted(fusion: Fusion) -> float:
+    """θ of the horizontal acceleration after the last detection."""
+    assert at(fusion, START).time
+    return float(fusion._memories[len(fusion._detections) - 1, 0])
+
+
+def test_false_detections_say_nothing_of_the_targets_acceleration():
+    """One in ten is false, whoever detects: the acceleration's σ grows by less than a third in 8 s.
+
+    Counted with d² = ``gate``, as those of a target that turned, they make it eight times as large.
+    """
+    random = np.random.default_rng(7)
+    for seed in range(2):
+        source, found, _ = flight("rtk", seed, 8.0)
+        wrong = [
+            one._replace(fields=np.concatenate([random.uniform(-15, 15, 3), one.fields[3:]]))
+            if random.uniform() < 0.1
+            else one
+            for one in found
+        ]
+        grown = adapted(fused(source, wrong)) - adapted(fused(source, found))
+        assert np.exp(0.5 * grown) < 1.33
+
+
+def test_refused_detections_that_agree_say_that_the_target_accelerates():
+    """It rests for 3 s, then runs at 6 m/s at once: all are refused, and θ grows at once."""
+    source, random = source_of("truth", 0.1), np.random.default_rng(3)
+    cameras = [Vehicle(11 + k, 1.3 * k, source, random) for k in range(4)]
+    fusion = Fusion(source, WINDOW)
+    for tick in range(34):
+        time = START + tick * STEP
+        place = np.array([6.0 * max(0.1 * (tick - 30), 0.0), 0.0, 0.0])
+        for camera in cameras:
+            fusion.put(camera.sees(time, place))
+        if tick == 30:
+            before = adapted(fusion)
+    assert adapted(fusion) > before + 1.0
+
+
 def test_after_a_false_beginning_it_begins_anew():
     source, found, walker = flight("rtk", 2, 4.0)
     fields = found[0].fields.copy()
@@ -397,7 +436,7 @@ def test_a_detection_has_the_covariance_of_its_camera_and_the_directions_of_its_
     assert fields[21] == pytest.approx(distance, rel=1e-14)
 
 
-def test_what_was_seen_recently_is_counted_by_vehicle_with_its_mean_weight():
+def test_what_was_seen_recently_is_counted_by_vehicle_with_its_median_weight():
     source, found, _ = flight("rtk", 6, 1.9)
     found[25] = found[25]._replace(fields=np.concatenate([[40.0, 0.0, 0.0], found[25].fields[3:]]))
     fusion, since = fused(source, found[::-1]), found[0].time + 500_000
@@ -408,8 +447,20 @@ def test_what_was_seen_recently_is_counted_by_vehicle_with_its_mean_weight():
     for vehicle, (number, weight) in seen.items():
         weights = [one.weight for one in used if one.vehicle == vehicle]
         assert number == len(weights)
-        assert weight == pytest.approx(np.mean(weights), rel=1e-12)
+        assert weight == pytest.approx(np.median(weights), rel=1e-12)
     assert fusion.recent(found[-1].time + 1) == {}
+
+
+def test_one_detection_that_weighs_a_hundred_times_as_much_hardly_changes_the_weight():
+    """A false detection nearby that passes: w_k is computed with the measured distance."""
+    source, found, _ = flight("rtk", 6, 1.9)
+    since = found[0].time + 500_000
+    clean = fused(source, found).recent(since)
+    row = max(k for k, one in enumerate(found) if one.vehicle == 12)
+    found[row] = found[row]._replace(weight=100.0 * found[row].weight)
+    seen = fused(source, found).recent(since)
+    assert seen[12].weight == pytest.approx(clean[12].weight, rel=0.1)
+    assert (seen[11], seen[13]) == (clean[11], clean[13])
 
 
 def test_detections_beyond_the_window_are_remembered():

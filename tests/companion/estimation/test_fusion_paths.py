@@ -9,8 +9,10 @@ import pytest
 from scipy.stats import chi2
 
 from companion.config.target_source import FusedSource
+from companion.estimation.fusion import Fusion
+from companion.estimation.turn_rate import turning_path
 from tests.companion.estimation.cameras import START, Vehicle, source_of
-from tests.companion.estimation.test_fusion import STEP, at, fused
+from tests.companion.estimation.test_fusion import STEP, WINDOW, at, fused
 
 Path = Callable[[float], "np.ndarray[tuple[int], np.dtype[np.float64]]"]
 SECONDS = 6.0
@@ -73,6 +75,55 @@ def spread(source: FusedSource, random, late, seconds: float = 9.0) -> float:
         for camera, delay in zip(cameras, late, strict=True)
     ]
     return float(np.trace(at(fused(source, found), found[-1].time).covariance))
+
+
+def ahead(path: Path, rate: float, seconds: float = 1.6, settled: float = 2.0) -> tuple[float, float]:
+    """Return the RMS of errors (m) of the way in the next ``seconds``, by the estimates of one flight.
+
+    First with ``rate`` times the estimated turn rate, then straight on.
+    """
+    source, random = source_of("rtk", 0.5), np.random.default_rng(31)
+    cameras = [Vehicle(11 + k, 1.3 * k, source, random) for k in range(5)]
+    fusion, squares = Fusion(source, WINDOW), []
+    for tick in range(round(1e6 * SECONDS / STEP)):
+        time = 1e-6 * tick * STEP
+        for camera in cameras:
+            fusion.put(camera.sees(START + tick * STEP, path(time)))
+        if time >= settled:
+            known, way = at(fusion, START + tick * STEP), path(time + seconds) - path(time)
+            ends = [
+                turning_path(np.zeros(3), known.velocity, turn, np.array([seconds])).positions[0] - way
+                for turn in (rate * known.turn_rate, 0.0)
+            ]
+            squares.append([float(end[:2] @ end[:2]) for end in ends])
+    bent, straight = np.sqrt(np.mean(squares, axis=0)).tolist()
+    return bent, straight
+
+
+def test_the_way_ahead_bends_as_the_targets():
+    """On a circle the end of a horizon is less than half as far from the truth as straight on."""
+    bent, straight = ahead(circle, 1.0)
+    assert bent < 0.5 * straight
+    # Turned to the other side it would be farther.
+    assert ahead(circle, -1.0)[0] > 1.2 * straight
+
+
+def test_of_a_target_that_walks_straight_on_the_way_ahead_is_about_straight():
+    bent, straight = ahead(line, 1.0)
+    assert bent < straight + 0.1
+
+
+def test_of_a_target_that_rests_the_turn_rate_is_small():
+    """Its velocity is noise, which has a course, and changes it all the time."""
+    source, random, rates = source_of("rtk", 0.5), np.random.default_rng(4), []
+    cameras = [Vehicle(11 + k, 1.3 * k, source, random) for k in range(5)]
+    fusion = Fusion(source, WINDOW)
+    for tick in range(60):
+        for camera in cameras:
+            fusion.put(camera.sees(START + tick * STEP, np.zeros(3)))
+        known = at(fusion, START + tick * STEP)
+        rates.append(abs(known.turn_rate) * float(np.linalg.norm(known.velocity)))
+    assert max(rates[20:]) < 0.4
 
 
 def fixed(source: FusedSource) -> FusedSource:
