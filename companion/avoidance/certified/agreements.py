@@ -231,7 +231,10 @@ class Agreements:
         if newest is None or newest.plan.epoch < self.since or self._farewell is not None:
             return
         for peer in self._peers.values():
-            if peer.left is None and peer.stated and peer.plans.newest is not None and not peer.doubted(now):
+            settled = peer.settled is newest and now <= peer.settled_until
+            if settled or peer.left is not None or peer.doubted(now):
+                continue
+            if peer.stated and peer.plans.newest is not None:
                 self._negotiation.advance(now, peer, newest, self.since)
 
     @property

@@ -22,7 +22,8 @@ from companion.avoidance.certified.committed import (
     rounding,
 )
 from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
-from companion.avoidance.certified.qp import Objective, SeparationQp, State
+from companion.avoidance.certified.mended_rounding import mended
+from companion.avoidance.certified.qp import Answer, Objective, SeparationQp, State
 from companion.avoidance.certified.separating_planes import Others, kept, planes
 from companion.avoidance.certified.vicinity import region, within_region
 from companion.config.certified import CertifiedConfig
@@ -191,8 +192,9 @@ class Commitment:
         box = None
         if self._sides is not None:
             box = region(own, goal.place, self._sides - 2.0 * self._rounding.max())
-        # Rounding may violate a plane that is only just kept: the second attempt adds the rounding error.
-        reason = HoldReason.UNSOLVED
+        # Rounding may violate a plane that is only just kept: the second attempt adds the rounding error, and
+        # where that leaves no plan, the first rounded one is mended.
+        reason, rounded = HoldReason.UNSOLVED, None
         for attempt in range(2):
             if attempt:
                 wanted = np.maximum(corridor.wanted, corridor.least + self._rounding)
@@ -204,20 +206,42 @@ class Commitment:
                 continue
             reason = HoldReason.ROUNDING
             # The rounded plan is checked, because the others receive the rounded one.
-            if kept(corridor, points) and self._compact(own, points):
-                ways = np.zeros(answer.forces.shape)
-                ways[: len(others.controls)] = others.controls[:, -1, 2] - others.controls[:, 0, 0]
-                pushes = Pushes(answer.forces, ways / (1e-6 * self._config.dt_us * self._program.n))
-                moving = objective.moving
-                gradient = self._program.costs[moving].gradient_per_metre
-                seconds = 1e-6 * self._config.epoch_us
-                self._deadlock_turn.learn(
-                    points[-1, 2], goal.place, pushes, gradient, seconds, goal.beyond, moving=moving
-                )
-                self.following = plan
+            whole = kept(corridor, points)
+            if whole and self._compact(own, points):
+                self._adopt(plan, points, answer, objective, goal, others)
                 return True
+            if not whole and rounded is None:
+                rounded = plan, answer
+        if rounded is not None:
+            better, answer = mended(rounded[0], corridor), rounded[1]
+            if better is not None:
+                points = controls(better)
+                if kept(corridor, points) and self._compact(own, points):
+                    self._adopt(better, points, answer, objective, goal, others)
+                    return True
         self.carry_on(reason)
         return False
+
+    def _adopt(
+        self,
+        plan: WirePlan,
+        points: Array,
+        answer: Answer,
+        objective: Objective,
+        goal: Subgoal,
+        others: Others,
+    ) -> None:
+        """Make ``plan``, with control points (n, 3, 3), m, that of the next epoch; learn from ``answer``."""
+        ways = np.zeros(answer.forces.shape)
+        ways[: len(others.controls)] = others.controls[:, -1, 2] - others.controls[:, 0, 0]
+        pushes = Pushes(answer.forces, ways / (1e-6 * self._config.dt_us * self._program.n))
+        moving = objective.moving
+        gradient = self._program.costs[moving].gradient_per_metre
+        seconds = 1e-6 * self._config.epoch_us
+        self._deadlock_turn.learn(
+            points[-1, 2], goal.place, pushes, gradient, seconds, goal.beyond, moving=moving
+        )
+        self.following = plan
 
     def _compact(self, own: Array, points: Array) -> bool:
         """Return whether the plan ``points`` may replace the plan ``own`` (n, 3, 3), m, by its length."""

@@ -65,9 +65,14 @@ def committed_with_controls(start: WirePlan, accelerations: Array) -> tuple[Wire
     rounded: npt.NDArray[np.int64] = np.empty(accelerations.shape, np.int64)
     if not _rounded(start.velocity, np.ascontiguousarray(accelerations), rounded):
         raise CertificateError("an acceleration is not finite")
-    knots: tuple[Integers, ...] = tuple((x, y, z) for x, y, z in rounded.tolist())
-    plan = WirePlan(*start[:4], knots, *start[5:])
+    plan = with_accelerations(start, rounded)
     return plan, _controls_of(plan, rounded)
+
+
+def with_accelerations(start: WirePlan, units: npt.NDArray[np.int64]) -> WirePlan:
+    """Return the plan from the state that ``start`` begins with; ``units`` (n, 3): of the wire, mm/s²."""
+    knots: tuple[Integers, ...] = tuple((x, y, z) for x, y, z in units.tolist())
+    return WirePlan(*start[:4], knots, *start[5:])
 
 
 def rounding(steps: int, dt: int) -> Array:
@@ -84,7 +89,7 @@ def rounding(steps: int, dt: int) -> Array:
 
 def controls(plan: WirePlan) -> Array:
     """Return control points (n, 3, 3) of the segments, m, fleet-local ENU."""
-    return _controls_of(plan, _accelerations(plan))
+    return _controls_of(plan, accelerations_of(plan))
 
 
 def _controls_of(plan: WirePlan, accelerations: npt.NDArray[np.int64]) -> Array:
@@ -103,9 +108,9 @@ def horizon_of(plan: WirePlan, following: WirePlan | None = None, after: int = 0
     knots = np.empty((first + max(last, 1), 9))
     seconds = plan.dt * 1e-6
     units = 0.5 * _MM * seconds**2, _MM * seconds
-    _knots(plan.position, plan.velocity, _accelerations(plan)[:first], *units, knots[: first + 1])
+    _knots(plan.position, plan.velocity, accelerations_of(plan)[:first], *units, knots[: first + 1])
     if following is not None:
-        _knots(following.position, following.velocity, _accelerations(following), *units, knots[first:])
+        _knots(following.position, following.velocity, accelerations_of(following), *units, knots[first:])
     return Horizon(plan.epoch, plan.dt, knots)
 
 
@@ -115,7 +120,7 @@ def rest_time(horizon: Horizon) -> int:
     return horizon.epoch + horizon.dt * (int(moves[-1]) + 1 if len(moves) else 0)
 
 
-def _accelerations(plan: WirePlan) -> npt.NDArray[np.int64]:
+def accelerations_of(plan: WirePlan) -> npt.NDArray[np.int64]:
     """Return the accelerations (n, 3) in units of the wire."""
     flat = chain.from_iterable(plan.accelerations)
     return np.fromiter(flat, np.int64, 3 * len(plan.accelerations)).reshape(-1, 3)

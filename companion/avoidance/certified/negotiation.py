@@ -8,6 +8,7 @@ the same agreement at once, which saves a message. If each proposed another one,
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import NamedTuple
 
 from companion.avoidance.certified.pair import Agreement
@@ -62,9 +63,11 @@ class Negotiation:
     def advance(self, now: int, peer: Peer, newest: StoredPlan, since: int) -> None:
         """Take an offer of ``peer`` that the ``newest`` own plan keeps, or propose or refuse one.
 
-        Offers on own plans of before ``since`` (µs) are void.
+        Offers on own plans of before ``since`` (µs) are void. If there was nothing to do, and only something
+        new of the peer or of the own plan can change that, the peer is ``settled``.
         """
         pair, epoch = peer.pair, newest.plan.epoch
+        before = pair.kept, pair.considered
         peer.contradicted &= pair.confirmed is None
         refused = None
         for one in pair.offers:
@@ -89,6 +92,11 @@ class Negotiation:
         elif other is not None and not pair.kept and pair.acknowledge(other.plan.epoch):
             # If this vehicle ends before there is an agreement, its farewell answers the peer all the same.
             peer.changed = True
+        if (pair.kept, pair.considered) == before:
+            # A proposal that waits for an answer is followed by another one after a time: nothing else waits.
+            waiting, patience = peer.waiting(now), _OVERDUE * peer.round_trip
+            waits = waiting is not None and waiting <= patience
+            peer.settled, peer.settled_until = newest, now + patience - waiting if waits else inf
 
     def plans_of(self, peer: Peer, one: Agreement) -> AgreedPlans | None:
         """Return the two plans of an agreement; None if one is not filed."""

@@ -27,7 +27,8 @@ class Peer:
     epoch, or was met, and no agreement was confirmed since. ``last_received``: time (µs) of its last plan or
     statement.
     ``round_trip`` (µs): from a proposal to its answer. ``changed``: the entry about it has changed since it
-    was last stated.
+    was last stated. ``settled``: the own newest plan with which the negotiation had nothing to do, and has
+    nothing to do until ``settled_until`` (µs) if nothing new is known of the peer; None: it must look.
     """
 
     def __init__(self, own: int, system: int, *, parts: bool = False) -> None:
@@ -41,6 +42,8 @@ class Peer:
         self.last_payload = b""
         self.round_trip = _ROUND_TRIP_US
         self.changed = True
+        self.settled: StoredPlan | None = None
+        self.settled_until = 0.0
         self._statement_epoch = 0
         self._proposed: dict[Agreement, int] = {}
         self._seen: dict[Statement, tuple[tuple[Agreement, ...], Agreement]] = {}
@@ -55,6 +58,7 @@ class Peer:
 
         Returns False if it contradicts a filed plan: two vehicles have this id, see ``contradict``.
         """
+        self.settled = None
         if self.plans.add(plan, (one.other for one in self.pair.referenced())):
             self.last_received = now
             self._end_departure(plan)
@@ -85,7 +89,7 @@ class Peer:
             self._return()
 
     def _return(self) -> None:
-        self.left, self.departed = None, False
+        self.left, self.departed, self.settled = None, False, None
 
     def receive(self, now: int, statement: Statement, since: int) -> bool:
         """Receive a statement of the peer; return whether names, farewell or return have changed.
@@ -103,7 +107,7 @@ class Peer:
             return self._receive_head(statement)
         changed = self._receive_head(statement)
         if statement.away:
-            self.last_received = now
+            self.settled, self.last_received = None, now
             return changed
         if self.left is not None:
             if statement.epoch <= self.left.plan.epoch:
@@ -116,10 +120,12 @@ class Peer:
             self.departed = False
         self.last_received = now
         if statement.farewell:
+            self.settled = None
             accepted = statement.epoch <= now and self._answers(statement, since)
             return (accepted and self._part(statement.epoch)) or changed
         for entry in statement.entries:
             if entry.peer == self._own:
+                self.settled = None
                 self.changed |= self.pair.receive(statement.epoch, statement.since, entry)
                 self._measure(now)
         if len(self._seen) >= _SEEN:
@@ -133,9 +139,11 @@ class Peer:
             return False
         self._statement_epoch, self.away = statement.epoch, statement.away
         self.outside = statement.outside
-        before = dict(self.names)
-        self.names.update({one.peer: one.departed for one in statement.entries if one.peer != self._own})
-        return self.names != before
+        changed, names = False, self.names
+        for peer, _, _, departed in statement.entries:
+            if peer != self._own and names.get(peer) is not departed:
+                names[peer], changed = departed, True
+        return changed
 
     def begin(self) -> None:
         """Discard the agreements, because the own plan begins anew; also after an own farewell."""
@@ -171,6 +179,7 @@ class Peer:
 
     def void(self, others_since: int = 0) -> None:
         """Discard all agreements with the peer, see ``Pair.void``."""
+        self.settled = None
         self.pair.void(others_since)
         self._proposed.clear()
         self.changed = True
@@ -185,6 +194,7 @@ class Peer:
 
         Nothing else is known of its plans than these.
         """
+        self.settled = None
         self.contradicted = self.changed = True
 
     def propose(self, now: int, one: Agreement) -> None:

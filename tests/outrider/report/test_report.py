@@ -177,6 +177,10 @@ def test_a_scenario_by_a_bad_name_is_text(tmp_path: Path) -> None:
     [
         ({}, "Converged in 7.5 s"),
         ({"converged": False, "convergence_time_s": None}, "Stuck: not converged in 60 s"),
+        (
+            {"converged": False, "convergence_time_s": None, "others_converge_s": 6.2},
+            "Stuck: not converged; those whose companion did not end, in 6.2 s",
+        ),
         ({"d_min_violations": 1}, "One violation of d_min; converged in 7.5 s"),
         ({"d_min_violations": 3, "converged": None}, "3 violations of d_min"),
         ({"failure": "vehicle 12 came down"}, "Failed: vehicle 12 came down"),

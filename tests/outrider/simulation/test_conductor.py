@@ -190,6 +190,25 @@ def test_who_does_not_converge_is_flown_to_the_cap() -> None:
     assert run.conductor.clock_end == run.conductor.clock_start + 10_000_000
 
 
+@pytest.mark.parametrize(("ends_at", "lasts"), [(1.0, 7.0), (3.0, 9.0)])
+def test_the_arrival_of_the_others_ends_a_flight_but_not_before_the_last_companion_has_ended(
+    ends_at: float, lasts: float
+) -> None:
+    faults = [{"kind": "vanish", "vehicle": 12, "at_s": ends_at}]
+    changes = {"vehicles": 2, "airborne": True, "cap_s": 30.0, "faults": faults}
+    run = Run(scenario("antipodal-8", **changes, arrival="others"))
+    goals = run.starts.goals
+    assert goals is not None
+    run.show(1.0, run.starts.positions)
+    assert run.show(60.0, np.array([goals[0], run.starts.positions[1]]))
+    conductor = run.conductor
+    assert conductor.converged_at is None
+    assert conductor.clock_start is not None
+    assert conductor.clock_end is not None
+    seconds = 1e-6 * (conductor.clock_end - conductor.clock_start)
+    assert seconds == pytest.approx(lasts, abs=1e-6)
+
+
 def test_after_the_clock_all_are_told_to_land_unless_they_began_in_the_air() -> None:
     run = Run(GROUNDED)
     assert not run.show(15.0, run.starts.positions)

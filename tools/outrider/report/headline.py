@@ -41,7 +41,13 @@ def _outcome(run: Run) -> tuple[str, str]:
         return "open", "How it ended is not known: there is no summary"
     failure, violations = summary.get("failure"), _number(summary.get("d_min_violations")) or 0.0
     converged, seconds = summary.get("converged"), summary.get("convergence_time_s")
-    reached = f"converged in {seconds} s" if converged else f"not converged {_within(run)}"
+    others = _number(summary.get("others_converge_s"))
+    if converged:
+        reached = f"converged in {seconds} s"
+    elif others is not None:
+        reached = f"not converged; those whose companion did not end, in {others:g} s"
+    else:
+        reached = f"not converged {_within(run)}"
     if failure:
         return "bad", f"Failed: {failure}"
     if violations:

@@ -136,6 +136,11 @@ class Scenario(Part):
     d_min_target: Length | None = Field(None, description="m to the target; null: the target is no obstacle")
     d_min_obstacle: Length = Field(0.5, description="m from a vehicle's centre to an obstacle's surface")
     cap_s: float = Field(60.0, gt=0.0, le=3600.0, description="simulated seconds after the goal event")
+    arrival: Literal["all", "others"] = Field(
+        "all",
+        description="whose arrival ends a flight with a goal 6 s later: that of all vehicles, or of those"
+        " whose companion does not end for good, counted from the last such end at the earliest",
+    )
     links: AllLinks = AllLinks()
     partitions: tuple[PartitionPart, ...] = ()
     faults: tuple[FaultPart, ...] = Field((), description="what goes wrong with single vehicles, and when")

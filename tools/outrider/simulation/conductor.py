@@ -13,7 +13,7 @@ import numpy as np
 
 from outrider.runs.formation_error import standoff
 from outrider.runs.ground_truth import Array
-from outrider.scenarios.faults import Restart
+from outrider.scenarios.faults import Restart, Vanish
 from outrider.scenarios.scenario import FixedTarget, Scenario
 from outrider.scenarios.starts import Starts
 from outrider.simulation.covered_goals import CoveredGoals
@@ -146,6 +146,8 @@ class Conductor:
         target = scenario.target
         jumps = target.jumps if isinstance(target, FixedTarget) else ()
         self._last_jump = round(1e6 * jumps[-1].after_s) if jumps else 0
+        ends = [fault.at_s for fault in scenario.faults if isinstance(fault, Vanish)]
+        self._last_end = round(1e6 * max(ends, default=0.0))
         self._intruders = deque(_intruders(scenario))
         self._successors = deque(_successors(scenario))
         self._ordered: dict[int, Array] = {}
@@ -265,14 +267,26 @@ class Conductor:
             able = goals.lasting & ~goals.covered
             self._able.see(now, arrived=bool(able.any() and arrived[able].all()))
         over = since >= self._scenario.duration_s * 1e6
-        if self.converged_at is not None:
-            over = now >= self.converged_at + HOLD + _TIME_AFTER_CONVERGENCE_US
+        arrived_at = self._arrived_at(now - since)
+        if arrived_at is not None:
+            over = now >= arrived_at + HOLD + _TIME_AFTER_CONVERGENCE_US
         if over:
             self.clock_end = now
             if self._scenario.airborne:
                 self.stage = Stage.DONE
             else:
                 self._land(now)
+
+    def _arrived_at(self, start: int) -> int | None:
+        """Return since when (µs) all have arrived whose arrival ends the flight; ``start`` (µs): the clock's.
+
+        Those of ``others`` have not before the last companion has ended for good: the flight shows the
+        result of that, too.
+        """
+        if self.converged_at is not None or self._scenario.arrival == "all":
+            return self.converged_at
+        others = self.others_converged_at
+        return None if others is None else max(others, start + self._last_end)
 
     def _land(self, now: int) -> None:
         self.stage, self._land_at = Stage.LAND, now

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -131,6 +131,8 @@ def standing(own: Array, apart: Array, *, shares: bool) -> Others:
     return Others(own[None], there, np.full((1, STEPS), 2.0), np.array([shares]))
 
 
+@example(254636, 1.0, False)
+@example(254636, 1.0, True)
 @given(seeds, st.sampled_from([1.0, 1.5, 1.999, 2.0, 2.001, 2.01, 2.3]), st.booleans())
 def test_pulled_through_one_that_is_near_it_makes_plans_and_never_comes_nearer(
     seed: int, near: float, shares: bool

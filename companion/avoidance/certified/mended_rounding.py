@@ -1,0 +1,52 @@
+"""Mending of a rounded plan that breaks a separating plane: accelerations change by single units of the wire.
+
+A solution that lies on planes may break them once it is rounded. If there is room behind them, a solution
+that keeps them by the rounding error has none of this. Between a plane and a limit there may be none, as
+for a vehicle that brakes above the floor of its box below another one. Then the rounded plan is changed: one
+unit more of the acceleration before the control point that is furthest behind its plane, along the axis on
+which the plane faces most, and one unit less after it. So that point moves by half a unit times dt², all
+later ones by twice as much, and no velocity but the one between changes. Speeds and limits change no more
+than by rounding. The result must be checked like any rounded plan.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.avoidance.certified.committed import accelerations_of, controls, with_accelerations
+from companion.avoidance.certified.separating_planes import Planes
+from mavlink_bridge.wire.plan import WirePlan
+
+MOST_UNITS = 8
+"""Largest change of an acceleration (mm/s²); plans keep their bounds with a little more (``qp``)."""
+_MOST_STEPS = 64
+_SPARE_M = 1e-12
+"""Distance (m) beyond each plane that covers the rounding of this module's sums."""
+
+
+def mended(plan: WirePlan, planes: Planes) -> WirePlan | None:
+    """Return a plan beside ``plan``, which ends at rest as well, that keeps ``least`` of all ``planes``.
+
+    Returns None if single units lead to none, as between two planes that face each other, and if an
+    acceleration would change by more than ``MOST_UNITS``.
+    """
+    rounded = accelerations_of(plan)
+    changed = rounded.copy()
+    for _ in range(_MOST_STEPS):
+        found = with_accelerations(plan, changed)
+        room = np.einsum("mki,kji->mkj", planes.normals, controls(found)) - planes.least
+        # The beginning alone determines the first two control points.
+        room[:, 0, :2] = np.inf
+        obstacle, segment, point = np.unravel_index(int(room.argmin()), room.shape)
+        if room[obstacle, segment, point] >= _SPARE_M:
+            return found
+        # The last acceleration that moves this control point; the plan's last one ends at rest.
+        last = min(int(segment) - (point < 2), len(changed) - 2)
+        normal = planes.normals[obstacle, segment]
+        axis = int(np.abs(normal).argmax())
+        unit = 1 if normal[axis] > 0.0 else -1
+        changed[last, axis] += unit
+        changed[last + 1, axis] -= unit
+        if np.abs(changed - rounded).max() > MOST_UNITS:
+            return None
+    return None
