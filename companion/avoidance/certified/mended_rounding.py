@@ -37,11 +37,12 @@ def mended(plan: WirePlan, planes: Planes) -> WirePlan | None:
         room = np.einsum("mki,kji->mkj", planes.normals, controls(found)) - planes.least
         # The beginning alone determines the first two control points.
         room[:, 0, :2] = np.inf
-        obstacle, segment, point = np.unravel_index(int(room.argmin()), room.shape)
+        obstacle, segment, point = map(int, np.unravel_index(int(room.argmin()), room.shape))
         if room[obstacle, segment, point] >= _SPARE_M:
             return found
         # The last acceleration that moves this control point; the plan's last one ends at rest.
-        last = min(int(segment) - (point < 2), len(changed) - 2)
+        last = segment - 1 if point < 2 else segment
+        last = min(last, len(changed) - 2)
         normal = planes.normals[obstacle, segment]
         axis = int(np.abs(normal).argmax())
         unit = 1 if normal[axis] > 0.0 else -1

@@ -95,8 +95,8 @@ class Negotiation:
         if (pair.kept, pair.considered) == before:
             # A proposal that waits for an answer is followed by another one after a time: nothing else waits.
             waiting, patience = peer.waiting(now), _OVERDUE * peer.round_trip
-            waits = waiting is not None and waiting <= patience
-            peer.settled, peer.settled_until = newest, now + patience - waiting if waits else inf
+            left = inf if waiting is None or waiting > patience else patience - waiting
+            peer.settled, peer.settled_until = newest, now + left
 
     def plans_of(self, peer: Peer, one: Agreement) -> AgreedPlans | None:
         """Return the two plans of an agreement; None if one is not filed."""
