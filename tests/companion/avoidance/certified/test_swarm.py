@@ -11,6 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from companion.avoidance.certified.committed import rests
+from companion.avoidance.certified.negotiation import Negotiation
+from companion.avoidance.certified.peer import Peer
+from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.draws import UNTIL, goals, starts, swarms
 from tests.companion.avoidance.certified.flights import fly
@@ -48,6 +51,29 @@ def check_arrived(swarm: Swarm, goal: Array, seconds: int) -> None:
 def test_any_two_plans_are_apart_whatever_happens(swarm: Swarm) -> None:
     """Two that may plan keep an agreement in common, of the plans that are flown, and keep to its planes."""
     assert not swarm.faults()
+
+
+@pytest.mark.parametrize("rough", [Rough(0.3, 300_000, 0.2), Rough(0.0, 40_000)])
+def test_what_is_settled_leaves_nothing_to_negotiate(rough: Rough, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Looking at each peer after each message gives the same messages, byte by byte."""
+
+    def sent() -> list[bytes]:
+        swarm = Swarm(starts(3, 5), rough, [Habits(), Habits(leaves=2_500_000), Habits()], 5)
+        swarm.run(4_000_000, goals(5))
+        return swarm.sent
+
+    looked, expected = 0, sent()
+    advance = Negotiation.advance
+
+    def always(self: Negotiation, now: int, peer: Peer, newest: StoredPlan, since: int) -> None:
+        nonlocal looked
+        advance(self, now, peer, newest, since)
+        looked += peer.settled is not None
+        peer.settled = None
+
+    monkeypatch.setattr(Negotiation, "advance", always)
+    assert sent() == expected
+    assert looked > 100
 
 
 @pytest.mark.slow
