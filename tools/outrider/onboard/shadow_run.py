@@ -20,7 +20,7 @@ from outrider.onboard.request import Request
 from outrider.onboard.setpoint_check import setpoint_check
 from outrider.onboard.trajectory_comparison import comparison
 from outrider.runs.directories import new_directory
-from outrider.shadow.findings import document_of, leave
+from outrider.shadow.findings import damage, damaged_records, document_of, leave
 from outrider.shadow.roles import OwnRecords, Roles, survey
 from outrider.shadow.shadow_run import ShadowRun, shadow_flight
 from outrider.terminal.lines import say
@@ -47,15 +47,17 @@ def dry_run_of_log(asked: Request, log: Path) -> int:
             def reported(now: int, _read: int) -> None:
                 watch(log.name, (now - seen.begin) / max(seen.end - seen.begin, 1))
 
+            reader = read_tlog(log)
             found = shadow_flight(
                 config.settings,
                 Roles(config.system, None, target),
                 seen,
-                read_tlog(log),
+                reader,
                 reported,
                 config.origin.frame,
                 follow=config.clock != "wall",
             )
+            found.damaged = damaged_records(reader.report, found.records)
     except LogError as error:
         raise InputError(f"--autopilot: {error}") from None
     faults = _faults(asked, found, profile.setpoint_mask)
@@ -78,6 +80,8 @@ def dry_run_of_log(asked: Request, log: Path) -> int:
     if target is None:
         whom = f"a target below the vehicle's first position, as system {config.target} sends none"
     say(f"{log.name}: vehicle {config.system}, {profile.name}")
+    if line := damage(log.name, found):
+        say(line)
     say(f"{len(found.would)} set-points would have been sent, around {whom}")
     for words, steps in sorted(found.reasons.items(), key=lambda pair: -pair[1]):
         say(f"{steps * 0.01:8.2f} s without a set-point: lacking {words}")

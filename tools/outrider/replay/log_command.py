@@ -19,11 +19,12 @@ from outrider.resources import find
 from outrider.runs import names
 from outrider.runs.directories import new_directory
 from outrider.scenarios.scenario import FIRST_SYSTEM, Scenario
-from outrider.shadow.findings import document_of, leave
+from outrider.shadow.findings import damage, damaged_records, document_of, leave
 from outrider.shadow.roles import Roles, check, survey
 from outrider.shadow.shadow_run import ShadowRun, shadow_flight
 from outrider.simulation.console import progress
 from outrider.swarm.command import fly
+from outrider.terminal.lines import say
 from outrider.terminal.share_progress import share_progress
 from outrider.yaml_files.yaml_file import load
 
@@ -50,10 +51,14 @@ def replay_log(log: Path, cast: Roles, like: str, out: Path | None, as_json: boo
             def reported(now: int, _read: int) -> None:
                 watch(log.name, (now - seen.begin) / max(seen.end - seen.begin, 1))
 
-            found = shadow_flight(config, cast, seen, pacing(read_tlog(log)), reported)
+            reader = read_tlog(log)
+            found = shadow_flight(config, cast, seen, pacing(reader), reported)
+            found.damaged = damaged_records(reader.report, found.records)
     except LogError as error:
         raise InputError(str(error)) from None
     _tell(f"{log.name} · vehicle {cast.own}", found, directory, as_json)
+    if line := damage(log.name, found):
+        say(line)
     if found.would:
         return 0
     missing = max(found.reasons, key=lambda reason: found.reasons[reason], default="any message of it")

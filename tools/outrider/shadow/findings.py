@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mavlink_bridge.tlog.log import TlogReport
 from outrider.shadow.picture import draw
 from outrider.shadow.setpoints import apart, course, facts
 from outrider.shadow.shadow_run import ShadowRun
@@ -22,7 +23,9 @@ def document_of(found: ShadowRun) -> dict[str, object]:
     """Return the results for scripts.
 
     They describe the set-points that would have been sent and, under ``sent``, those that were sent;
-    ``apart_m`` has the 50th and 95th percentiles of the distance between the two.
+    ``apart_m`` has the 50th and 95th percentiles of the distance between the two. ``damaged_records`` have a
+    wrong checksum, or a stamp that is no time; frames of the second kind are used nevertheless, where the
+    reader has a time for them.
     """
     would, sent = facts(found.would), facts(found.sent)
     off = apart(course(found.would), course(found.sent))
@@ -30,11 +33,25 @@ def document_of(found: ShadowRun) -> dict[str, object]:
     document["holds"] = found.holds
     document["reasons"] = dict(found.reasons)
     document["records"] = found.records
+    document["damaged_records"] = found.damaged
     document["sent"] = sent._asdict()
     document["apart_m"] = {
         f"p{q}": round(float(np.percentile(off, q)), 3) if len(off) else None for q in (50, 95)
     }
     return document
+
+
+def damaged_records(report: TlogReport, used: int) -> int:
+    """Return how many records of a log are damaged, after a pass that has used ``used`` of them."""
+    return report.bad + report.truncated + max(report.good - used, 0)
+
+
+def damage(name: str, found: ShadowRun) -> str:
+    """Return a line about the damaged records of the log ``name``, or an empty string."""
+    if not found.damaged:
+        return ""
+    records = "1 record is" if found.damaged == 1 else f"{found.damaged} records are"
+    return f"{name}: {records} damaged (a wrong checksum, or a stamp that is no time); the rest is used"
 
 
 def leave(directory: Path, name: str, found: ShadowRun, document: dict[str, object]) -> None:

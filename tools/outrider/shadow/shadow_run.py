@@ -48,7 +48,7 @@ class ShadowRun:
     ``would``: set-points that the companion would have sent; ``sent``: those that were, each with its time
     (µs of the log); ``places``: (time, position (3,)) NED of the vehicle itself, local as the set-points are.
     ``reasons``: number of 10 ms steps without a set-point, by the missing input; ``holds``: number of held
-    plans; ``records``: number of records read.
+    plans; ``records``: number of records read; ``damaged``: number of damaged records of the log.
     """
 
     would: list[Sent] = field(default_factory=list)
@@ -57,6 +57,7 @@ class ShadowRun:
     reasons: Counter[str] = field(default_factory=Counter)
     holds: int = 0
     records: int = 0
+    damaged: int = 0
 
 
 def shadow_flight(
