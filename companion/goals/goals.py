@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import hypot, inf
 from typing import Protocol
 
@@ -23,6 +22,7 @@ from companion.values.horizon import Array, Motion
 from companion.values.mates import Mates, Sight
 from companion.values.obstacles import Obstacles
 from companion.values.phase import UNDER_WAY, Phase
+from companion.values.speed_bounds import SpeedBounds
 from companion.ways import way_of
 from companion.world import View
 
@@ -41,14 +41,6 @@ _BLOCKED_WITHIN_M, _NO_PROGRESS_TIMEOUT_US = 5.0, 10_000_000
 """A vehicle within this distance of its start that has come no nearer for this time is back, too."""
 
 _NO_MATES, _NO_SIGHT = Mates(), Sight()
-
-Pace = Callable[[Array, Array], float]
-"""Speed (m/s) that is allowed from a place (3,) in a direction (3,), both m."""
-
-
-def _any_pace(_place: Array, _towards: Array) -> float:
-    """Return ∞: no neighbour is unheard."""
-    return inf
 
 
 class Flight(Protocol):
@@ -155,7 +147,7 @@ class Goals:
         mates: Mates = _NO_MATES,
         smaller_ids: int = 0,
         sight: Sight = _NO_SIGHT,
-        pace: Pace = _any_pace,
+        bounds: SpeedBounds | None = None,
         *,
         cautious: bool,
     ) -> Aim:
@@ -163,9 +155,9 @@ class Goals:
 
         ``cautious`` limits the distance to the destination to what ``guard.cautious_speed`` covers within a
         horizon. ``obstacles``: what settling keeps clear of. ``mates``: those that share the surface.
-        ``smaller_ids``: how many neighbours have a smaller id. ``sight``: of the target. ``pace``: the
-        speed (m/s) that is allowed from a place (3,) in a direction (3,). Raises SurfaceError if the function
-        of a user's surface fails.
+        ``smaller_ids``: how many neighbours have a smaller id. ``sight``: of the target.
+        ``bounds``: on the speed at the measured position; they go with the aim, and limit its distance, too.
+        Raises SurfaceError if the function of a user's surface fails.
         """
         step = self._config.guard.return_step
         self._lane = step * smaller_ids + self._clearance if step else 0.0
@@ -173,7 +165,8 @@ class Goals:
         limit = self._config.guard.cautious_speed
         speed = inf if limit is None or not cautious else limit
         offset = aim.destination - (aim.target_end - aim.target) - measured.position
-        speed = min(speed, pace(measured.position, offset))
+        if bounds is not None:
+            aim, speed = aim._replace(bounds=bounds), min(speed, bounds.along(offset))
         return aim if speed == inf else self._shortened(aim, measured, speed)
 
     def _on_way(self, aim: Aim, measured: Motion) -> Aim:

@@ -370,14 +370,6 @@ class Neighbours:
             meant = limit(self._table.accelerations(ids, times), self._config.limits.a_total)
         return flown_on(states, meant, most, np.where(late, 0.0, 1e-6 * guard.plan_stale_us))
 
-    def pace(self, now: int, place: Array, towards: Array) -> float:
-        """Return the speed (m/s) with which a vehicle at ``place`` (3,), m, may fly ``towards`` (3,), m.
-
-        It is ∞ unless neighbours have been unheard for ``guard.unheard_us``, see ``Unheard``.
-        """
-        bounds = self.bounds(now, place)
-        return inf if bounds is None else bounds.along(towards)
-
     def bounds(self, now: int, place: Array) -> SpeedBounds | None:
         """Return the bounds on the speed of a vehicle at ``place`` (3,), m, beside unheard neighbours.
 

@@ -192,7 +192,6 @@ class FieldAvoidance:
         """Make a plan towards ``aim``; return its positions (N + 1, 3), m, or None if the old one is kept."""
         horizon, config = self.guard.horizon, self._config.horizon
         state = self.guard.anchor(now, situation.measured)
-        bounds = self._world.neighbours.bounds(now, situation.measured.position)
         started = self._times.stopwatch()
         try:
             prediction = (
@@ -207,7 +206,7 @@ class FieldAvoidance:
             if aim.spacing < inf:
                 obstacles = obstacles.shared(self._world.neighbours.mate_ids(now), aim.spacing)
             plan = self.planner.plan(
-                now, state.position, state.velocity, prediction, aim, obstacles, state.acceleration, bounds
+                now, state.position, state.velocity, prediction, aim, obstacles, state.acceleration
             )
         except CompanionError:
             self.guard.hold(now, solver=True)

@@ -126,9 +126,9 @@ class Planning:
             sight = _NO_SIGHT
             if isinstance(self._config.formation, Perception):
                 sight = self._world.sight(now, self._avoidance.lookahead_s)
-            pace = partial(self._world.neighbours.pace, now)
+            bounds = self._world.neighbours.bounds(now, measured.position)
             aim = self._goals.aim(
-                now, view, measured, obstacles, mates, below, sight, pace, cautious=cautious
+                now, view, measured, obstacles, mates, below, sight, bounds, cautious=cautious
             )
         except SurfaceError:
             return None

@@ -35,7 +35,8 @@ class Aim(NamedTuple):
     end of the horizon. ``surface`` is the one that x̌ lies on, None for a goal. ``spacing``: distance (m)
     that vehicles that share the surface shall keep; ∞ where it is not shared. ``path`` gives the places and
     velocities of a destination that moves after times (n,), s, from now; None for one at rest. ``clear``:
-    no fixed obstacle is between the vehicle and x̌, which is on a way around them.
+    no fixed obstacle is between the vehicle and x̌, which is on a way around them. ``bounds``: what the speed
+    of the plan keeps beside unheard neighbours; None if all are heard.
     """
 
     destination: Array
@@ -46,6 +47,7 @@ class Aim(NamedTuple):
     spacing: float = inf
     path: Callable[[Array], tuple[Array, Array]] | None = None
     clear: bool = False
+    bounds: SpeedBounds | None = None
 
 
 def standing(goal: Array, target: Array | None = None) -> Aim:
@@ -105,13 +107,11 @@ class Planner:
         aim: Aim,
         obstacles: Obstacles,
         acceleration: Array = _ZERO,
-        bounds: SpeedBounds | None = None,
     ) -> Plan:
         """Return a plan from the state at ``now`` (µs).
 
         ``acceleration`` (3,), m/s², is flown until then. ``prediction`` (N + 1, 3), m, is the previous plan
-        at n = 0…N. ``bounds``: what its speed keeps beside unheard neighbours. Raises SolverError when there
-        is no solution: the caller keeps the plan that it has.
+        at n = 0…N. Raises SolverError when there is no solution: the caller keeps the plan that it has.
         """
         to_go = aim.destination - (aim.target_end - aim.target) - position
         scene = Scene(
@@ -139,8 +139,8 @@ class Planner:
             None if self.config.limits.j_max is None else Flown(acceleration, elapsed),
         )
         solution = self.dqmpc.solve(problem, influence.omega_scale)
-        if bounds is not None:
-            self._slowing.keep(position, velocity, acceleration, elapsed, bounds, solution.acceleration)
+        if aim.bounds is not None:
+            self._slowing.keep(position, velocity, acceleration, elapsed, aim.bounds, solution.acceleration)
         self._walls.keep(position, velocity, acceleration, elapsed, solution.acceleration)
         horizon = roll_out(now, self.config.horizon.dt_us, position, velocity, solution.acceleration)
         end = horizon.knots[-1]

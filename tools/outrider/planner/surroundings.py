@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
 
 import numpy as np
 
@@ -107,12 +106,8 @@ class Surroundings:
         """Return nothing: the caller says when each neighbour was where, so no date is in doubt."""
         return []
 
-    def pace(self, _now: int, _place: Array, _towards: Array) -> float:
-        """Return ∞: the caller says where the neighbours are, so none is unheard."""
-        return inf
-
     def bounds(self, _now: int, _place: Array) -> None:
-        """Return None: no neighbour is unheard."""
+        """Return None: the caller says where the neighbours are, so none is unheard."""
 
     def mates(self, now: int) -> Mates:
         """Return the neighbours that share a plan which is not too old."""
