@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -40,16 +40,16 @@ HELD: Final = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
 
 
 class Target:
-    """Circles and says so five times a second of a time that is ``speed`` times as fast as the wall's."""
+    """Circles, and says so five times a second of a time ``speed`` times as fast as the ``clock``."""
 
-    def __init__(self, link: Link, speed: float) -> None:
-        self._link, self._speed = link, speed
+    def __init__(self, link: Link, speed: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self._link, self._speed, self._clock = link, speed, clock
         self._beacon = Beacon(100, "target", 5.0, FLEET)
-        self._began = time.monotonic()
+        self._began = clock()
 
     def pump(self) -> None:
         """Say what is due."""
-        t = (time.monotonic() - self._began) * self._speed
+        t = (self._clock() - self._began) * self._speed
         if self._beacon.due(round(t * 1e6)):
             place = ORBIT * np.array([np.sin(TURN * t), np.cos(TURN * t) - 1.0, 0.0])
             velocity = ORBIT * TURN * np.array([np.cos(TURN * t), -np.sin(TURN * t), 0.0])
@@ -58,13 +58,20 @@ class Target:
 
 
 class Flying:
-    """A running ``outrider fly`` in ``directory``."""
+    """A running ``outrider fly`` in ``directory``; ``program``: what runs it."""
 
-    def __init__(self, directory: Path, *options: str) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        *options: str,
+        program: Sequence[str] = ("outrider",),
+        hands: Sequence[int] = (),
+    ) -> None:
         self.directory = directory / "run"
-        command = [sys.executable, "-m", "outrider", "fly", "--json", f"--out={self.directory}", *options]
+        command = [sys.executable, "-m", *program, "fly", "--json", f"--out={self.directory}", *options]
         self.process = subprocess.Popen(
             command,
+            pass_fds=hands,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -87,13 +94,21 @@ class Flying:
 
     def until(self, is_so: Callable[[], object]) -> None:
         """Wait, and let the target speak meanwhile."""
-        end = time.monotonic() + PATIENCE
+        end = self.now() + PATIENCE
         while not is_so():
-            assert time.monotonic() < end, self.events
+            assert self.now() < end, self.events
             assert self.process.poll() is None, self.process.communicate()
-            for pump in self.pump:
-                pump()
-            time.sleep(0.01)
+            self.rest()
+
+    def now(self) -> float:
+        """s, of the clock by which this waits."""
+        return time.monotonic()
+
+    def rest(self) -> None:
+        """A moment, in which the target speaks."""
+        for pump in self.pump:
+            pump()
+        time.sleep(0.01)
 
     def sees(self, what: str, text: str) -> None:
         """Wait for an event."""
@@ -101,8 +116,8 @@ class Flying:
 
     def wait(self, seconds: float) -> None:
         """So long."""
-        end = time.monotonic() + seconds
-        self.until(lambda: time.monotonic() > end)
+        end = self.now() + seconds
+        self.until(lambda: self.now() > end)
 
     def order(self, word: str) -> None:
         """As typed."""
@@ -120,12 +135,10 @@ class Flying:
         """Status and summary; with a signal first, or by itself."""
         if which is not None:
             self.process.send_signal(which)
-        end = time.monotonic() + PATIENCE
+        end = self.now() + PATIENCE
         while self.process.poll() is None:
-            assert time.monotonic() < end, self.events
-            for pump in self.pump:
-                pump()
-            time.sleep(0.01)
+            assert self.now() < end, self.events
+            self.rest()
         out, err = self.process.communicate()
         assert out, err
         return self.process.returncode, json.loads(out)

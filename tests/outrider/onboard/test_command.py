@@ -1,5 +1,5 @@
 """``outrider fly`` on vehicles of ``outrider sitl``: up, around a target, down; and what is left when it
-ends, whatever the reason. These tests really wait; they assert no timing."""
+ends, whatever the reason. All go by one clock that waits for the slowest."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.outrider.onboard.process import GUIDED, HELD, flight, is_gone
+from tests.outrider.onboard.lockstep import flight
+from tests.outrider.onboard.process import GUIDED, HELD, is_gone
 
 pytestmark = pytest.mark.slow
 
@@ -75,8 +76,7 @@ def test_sigterm_lets_it_hold(tmp_path: Path, flavour: str) -> None:
         # Where the machine is busy PX4's own time-out may have been quicker: then it holds as well.
         quicker = ("holds", "not ours") if flavour == "px4" else ("holds",)
         assert said["last_word"].startswith(quicker)
-        while ear.mode() != HELD[flavour]:
-            assert len(ear.beats) < 100
+        flying.until_vehicle(lambda: ear.mode() == HELD[flavour], 100)
 
 
 def test_a_group_that_is_signalled_and_not_read_leaves_a_vehicle_that_holds(tmp_path: Path) -> None:
@@ -91,8 +91,7 @@ def test_a_group_that_is_signalled_and_not_read_leaves_a_vehicle_that_holds(tmp_
         assert (status, said["ended"], said["fault"]) == (0, "stopped by SIGQUIT", False)
         assert said["restarts"] == []
         assert said["last_word"] == "holds (BRAKE)"
-        while ear.mode() != HELD["ardupilot"]:
-            assert len(ear.beats) < 100
+        flying.until_vehicle(lambda: ear.mode() == HELD["ardupilot"], 100)
 
 
 def test_who_is_left_alone_holds_and_ends(tmp_path: Path) -> None:
@@ -102,8 +101,7 @@ def test_who_is_left_alone_holds_and_ends(tmp_path: Path) -> None:
         pilot = flying.pilot
         flying.process.kill()
         flying.process.communicate()
-        while ear.mode() != HELD["ardupilot"] or not is_gone(pilot):
-            assert len(ear.beats) < 1000
+        flying.until_vehicle(lambda: ear.mode() == HELD["ardupilot"] and is_gone(pilot), 1000)
 
 
 def test_a_dry_run_asks_and_orders_nothing(tmp_path: Path) -> None:
