@@ -131,6 +131,14 @@ class RatesConfig(Settings):
     setpoint_us: Micros = Field(20_000, description="µs between set-points")
     state_us: Micros = Field(100_000, description="µs between messages of the own state to the others")
     plan_us: Micros = Field(100_000, description="µs between messages of the own plan to the others")
+    plan_after_us: int = Field(
+        0,
+        ge=0,
+        le=5_000_000,
+        multiple_of=4,
+        description="µs from the first message of the own state to the first of the own plan (field); 0: "
+        "both are in one datagram, which is lost as a whole; half of state_us: each is lost alone",
+    )
     detection_us: Micros = Field(
         100_000, description="µs between two forwarded detections, at least (target_source: fused)"
     )

@@ -72,7 +72,7 @@ class Sharing:
         """
         if self._boot is None:
             self._boot = now
-            self._next = [now, now, now]
+            self._next = [now, now, now + self._config.rates.plan_after_us]
         rates = self._config.rates
         autopilot: list[Message] = []
         swarm: list[Message] = []

@@ -125,4 +125,6 @@ def flight(
         finally:
             if flying.process.poll() is None:
                 flying.process.kill()
+                # Its child ends with the conductor: it would wait for its turn, and keep the pipes open.
+                conductor.close()
                 flying.process.communicate()

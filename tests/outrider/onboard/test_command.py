@@ -60,6 +60,7 @@ def test_a_companion_that_is_killed_leaves_a_vehicle_that_holds(tmp_path: Path) 
         assert ear.mode() == HELD["px4"]
         flying.order("go")
         flying.until(lambda: ear.mode() == GUIDED["px4"])
+        flying.wait(0.5)
         status, said = flying.end(signal.SIGINT)
         assert (status, said["fault"], len(said["restarts"])) == (0, False, 1)
         assert said["last_word"].startswith("holds")
@@ -100,8 +101,9 @@ def test_who_is_left_alone_holds_and_ends(tmp_path: Path) -> None:
         flying.sees("phase", "escort")
         pilot = flying.pilot
         flying.process.kill()
-        flying.process.communicate()
+        flying.process.wait()
         flying.until_vehicle(lambda: ear.mode() == HELD["ardupilot"] and is_gone(pilot), 1000)
+        flying.process.communicate()
 
 
 def test_a_dry_run_asks_and_orders_nothing(tmp_path: Path) -> None:
