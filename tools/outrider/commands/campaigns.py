@@ -76,6 +76,12 @@ def compare(
         Path | None,
         typer.Option(metavar="FOLDER", help="World files (CSV) of LSC's planners, in place of drawn worlds."),
     ] = None,
+    physics: Annotated[
+        bool,
+        typer.Option(
+            "--physics", help="With a vehicle in full physics, its limits and distances, in place of points."
+        ),
+    ] = False,
     jobs: Jobs = None,
     out: Begun = None,
     as_json: AsJson = False,
@@ -83,7 +89,8 @@ def compare(
     """Fly the scene of a published planner with its limits, and show ours beside the published figures."""
     from outrider.compare.command import compare as comparing
 
-    raise typer.Exit(comparing(name, seeds, jobs, out, as_json, tuple(row or ()), missions, worlds))
+    chosen = tuple(row or ())
+    raise typer.Exit(comparing(name, seeds, jobs, out, as_json, chosen, missions, worlds, physics=physics))
 
 
 def gallery(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +28,13 @@ def cells_of(
     rows: Sequence[Row],
     folder: Path | None,
     worlds: Path | None = None,
+    needed: Collection[str] | None = None,
 ) -> list[Cell]:
     """Return the cell of each of ``rows``, checked with the first seed; ``where`` is the comparison's file.
 
     ``folder``: mission files in place of drawn ones; ``worlds``: a folder of world files in place of drawn
-    worlds. Raises InputError before anything is flown.
+    worlds. A row that cannot be flown is left out unless its label is ``needed``, as by default all are.
+    Raises InputError before anything is flown.
     """
     if folder is not None and comparison.missions is None:
         raise InputError(f"--missions {folder}: {comparison.name} has one mission; allowed: no --missions")
@@ -59,9 +61,14 @@ def cells_of(
             given=tuple((_places(one.starts), _places(one.goals)) for one in given),
         )
         place = f"{where}: {row.label}"
-        # Read like a file, for the same messages.
-        scenario = read(json.dumps(document_of(scene, 1)).encode(), place, Scenario)
-        ready = prepared(scenario, place)
+        try:
+            # Read like a file, for the same messages.
+            scenario = read(json.dumps(document_of(scene, 1)).encode(), place, Scenario)
+            ready = prepared(scenario, place)
+        except InputError:
+            if needed is None or row.label in needed:
+                raise
+            continue
         document, vehicle = scene.model_dump_json(), ready.vehicle.model_dump_json()
         key = hashlib.sha256(json.dumps([document, vehicle]).encode()).hexdigest()[:_KEY_LENGTH]
         found.append(

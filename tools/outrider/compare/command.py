@@ -11,6 +11,7 @@ from outrider.compare import picture, table
 from outrider.compare.cells import cells_of
 from outrider.compare.comparison import Comparison, Row
 from outrider.compare.flying import RUN, TRACED
+from outrider.compare.physics import in_physics
 from outrider.compare.results import Result, result_of
 from outrider.compare.scene import Scene, scenario_of
 from outrider.errors import InputError
@@ -37,6 +38,8 @@ def compare(
     missions: Path | None = None,
     worlds: Path | None = None,
     run: str = RUN,
+    *,
+    physics: bool = False,
 ) -> int:
     """Fly the comparison ``name``, a file or a shipped one, and return the exit status.
 
@@ -44,24 +47,30 @@ def compare(
     a result, not an error. ``rows``: labels to fly, or beginnings of labels; by default all. The tables have
     these rows, and all others of which each seed is in the journal already. ``missions``: a
     folder with mission files of LSC's planners, in place of drawn ones; ``worlds``: one with their world
-    files. Writes ``compare.json``,
-    ``compare.md`` and ``compare.png`` beside the journal in ``out`` (default ``runs/sweep-compare-NAME``).
+    files. ``physics``: with the vehicle of the comparison's part ``physics`` (``in_physics``). Writes
+    ``compare.json``, ``compare.md`` and ``compare.png`` beside the journal in ``out`` (default
+    ``runs/sweep-compare-NAME``, in full physics ``…-physics``).
     """
     path = find("comparisons", name)
     comparison = load(path, Comparison)
+    if physics:
+        comparison = in_physics(comparison, path)
     chosen = _chosen(comparison, rows)
     # The journal is that of all rows, so that some of them are flown first, and others later. A folder of
     # missions or worlds may have those of the chosen rows alone.
     rows_of = comparison.rows if missions is None and worlds is None else chosen
-    every = cells_of(comparison, path, rows_of, missions, worlds)
-    cells = dict(zip((row.label for row in rows_of), every, strict=True))
+    # In full physics some rows may be too narrow: they are left out unless they are asked for.
+    needed = {row.label for row in chosen} if physics else None
+    every = cells_of(comparison, path, rows_of, missions, worlds, needed)
+    cells = {cell.label: cell for cell in every}
     title = f"compare-{comparison.name}"
     folder = places.prepare(out, title)
     numbers = range(TRACED, TRACED + (seeds or comparison.seeds))
     entries = flown(header(title, every), [cells[row.label] for row in chosen], numbers, folder, run, jobs)
     if entries is None:
         return INTERRUPTED
-    shown = [row for row in rows_of if row in chosen or _is_flown(cells[row.label], entries, numbers)]
+    possible = [row for row in rows_of if row.label in cells]
+    shown = [row for row in possible if row in chosen or _is_flown(cells[row.label], entries, numbers)]
     found = [cells[row.label] for row in shown]
     results = [
         _result(comparison, row, cell, entries, numbers) for row, cell in zip(shown, found, strict=True)

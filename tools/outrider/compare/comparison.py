@@ -95,6 +95,18 @@ class Published(Part):
     note: str = Field("", max_length=400, description="what to know of these figures")
 
 
+class Physics(Part):
+    """What ``--physics`` flies: the scene with a vehicle in full physics.
+
+    Its distances are its own: two vehicles keep its span, and centres half of it from obstacles.
+    """
+
+    vehicle: Text = Field(description="vehicle with rotors, shipped or a file")
+    set: dict[Key, JsonValue] = Field(
+        {}, description="values of the scenario by dotted key, such as its limits and its tube"
+    )
+
+
 class Comparison(Part):
     """Scene of a published planner."""
 
@@ -112,6 +124,7 @@ class Comparison(Part):
     seeds: int = Field(30, ge=1, le=100_000, description="flights of each row")
     set: dict[Key, JsonValue] = Field({}, description="values of the scenario for all rows, by dotted key")
     rows: tuple[Row, ...] = Field(min_length=1, max_length=100)
+    physics: Physics | None = Field(None, description="the scene in full physics; null: for points only")
     published: tuple[Published, ...] = Field((), max_length=500)
     differences: tuple[Text, ...] = Field((), max_length=50, description="what is not alike, a sentence each")
 

@@ -27,7 +27,7 @@ _HEADS = (
     "plan, ms",
     "bar",
 )
-_NOTHING = "–"
+_NOTHING, _PHYSICS = "–", ", full physics"
 
 
 def show(comparison: Comparison, results: Sequence[Result], console: Console | None = None) -> None:
@@ -81,7 +81,7 @@ def lines(comparison: Comparison, result: Result) -> Iterator[tuple[str, ...]]:
     bar = {None: "", True: "reached", False: "missed"}[result.reaches_bar]
     yield (
         result.row,
-        f"outrider ({result.vehicle})",
+        f"outrider ({result.vehicle}{_PHYSICS if result.motion == 'multirotor' else ''})",
         f"{result.succeeded} of {result.seeds}",
         _number(result.mean_s, 2),
         _number(result.last_s, 2),
