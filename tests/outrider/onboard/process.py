@@ -1,33 +1,24 @@
-"""``outrider fly`` and ``outrider sitl`` as processes, a target that circles, and what is seen of them."""
+"""A process of ``outrider fly``, a target that circles, and what is seen of them."""
 
 from __future__ import annotations
 
 import json
 import os
-import random
 import signal
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import yaml
 
-from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.links.link import Link
-from mavlink_bridge.links.opening import open_link
-from mavlink_bridge.messages import Heartbeat
-from mavlink_bridge.wire.codec import Codec
-from outrider.resources import find
 from outrider.simulation.beacon import Beacon
 from outrider.simulation.paths import Motion
-from tests.outrider.sitl_server.test_command import free_base, sitl
 
 HOST: Final = "127.0.0.1"
 PATIENCE: Final = 60.0
@@ -42,7 +33,7 @@ HELD: Final = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
 class Target:
     """Circles, and says so five times a second of a time ``speed`` times as fast as the ``clock``."""
 
-    def __init__(self, link: Link, speed: float, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, link: Link, speed: float, clock: Callable[[], float]) -> None:
         self._link, self._speed, self._clock = link, speed, clock
         self._beacon = Beacon(100, "target", 5.0, FLEET)
         self._began = clock()
@@ -57,7 +48,7 @@ class Target:
                 self._link.send(datagram.data)
 
 
-class Flying:
+class Flying(ABC):
     """A running ``outrider fly`` in ``directory``; ``program``: what runs it."""
 
     def __init__(
@@ -100,15 +91,13 @@ class Flying:
             assert self.process.poll() is None, self.process.communicate()
             self.rest()
 
+    @abstractmethod
     def now(self) -> float:
         """s, of the clock by which this waits."""
-        return time.monotonic()
 
+    @abstractmethod
     def rest(self) -> None:
         """A moment, in which the target speaks."""
-        for pump in self.pump:
-            pump()
-        time.sleep(0.01)
 
     def sees(self, what: str, text: str) -> None:
         """Wait for an event."""
@@ -142,48 +131,6 @@ class Flying:
         out, err = self.process.communicate()
         assert out, err
         return self.process.returncode, json.loads(out)
-
-
-class Receiver:
-    """Hears the modes that a vehicle of the SITL tells, by another of its ports."""
-
-    def __init__(self, link: Link) -> None:
-        self._link, self._codec = link, Codec()
-        self.beats: list[Heartbeat] = []
-
-    def mode(self) -> int | None:
-        """The last."""
-        for data in self._link.receive():
-            self.beats += [m for m in self._codec.feed(data, whole=True) if isinstance(m, Heartbeat)]
-        return self.beats[-1].custom_mode if self.beats else None
-
-
-@contextmanager
-def flight(
-    tmp_path: Path, flavour: str, speed: float, *options: str, clock: str = "autopilot"
-) -> Iterator[tuple[Flying, Receiver]]:
-    """One vehicle of the SITL, its companion, a target, and an ear."""
-    with ExitStack() as files:
-        base = free_base(flavour, 1)
-        files.enter_context(sitl(f"--flavour={flavour}", f"--speedup={speed}", f"--port-base={base}"))
-        group = f"mcast:239.255.{random.randrange(1, 250)}.{random.randrange(1, 250)}:{base},{HOST}"
-        autopilot = f"tcp:{HOST}:{base}" if flavour == "ardupilot" else f"udpin:{HOST}:{base}"
-        other = f"tcp:{HOST}:{base + 2}" if flavour == "ardupilot" else f"udpin:{HOST}:{base + 10}"
-        received, said = open_link(other, WallClock()), open_link(group, WallClock())
-        files.callback(received.close)
-        files.callback(said.close)
-        document = yaml.safe_load(find("companions", flavour).read_text(encoding="utf-8"))
-        (tmp_path / "own.yaml").write_text(yaml.safe_dump(document | {"system": 1, "clock": clock}))
-        config = f"--config={tmp_path / 'own.yaml'}"
-        flying = Flying(tmp_path, f"--autopilot={autopilot}", f"--swarm={group}", config, *options)
-        ear = Receiver(received)
-        flying.pump += [Target(said, speed).pump, ear.mode]
-        try:
-            yield flying, ear
-        finally:
-            if flying.process.poll() is None:
-                flying.process.kill()
-                flying.process.communicate()
 
 
 def is_gone(process: int) -> bool:
