@@ -22,12 +22,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.avoidance.certified.cost import Cost, arriving, following
+from companion.avoidance.certified.cost import arriving, following
 from companion.avoidance.certified.qp_vectors import write_cost
 from companion.avoidance.certified.rows import (
     BOUND,
+    Effects,
     active_set,
     combine,
+    effects,
     row_slacks,
     rows_within,
     write_rows,
@@ -119,6 +121,7 @@ class SeparationQp:
             moving: cost(config, self._S_x, self._S_v)
             for moving, cost in ((False, arriving), (True, following))
         }
+        self._effects = {moving: effects(cost.inverse, self._maps) for moving, cost in self.costs.items()}
         # Constant arguments of ``write_cost``.
         self._cost_parts: dict[bool, Any] = {
             moving: (
@@ -158,7 +161,7 @@ class SeparationQp:
         Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs or although
         the QP holds them.
         """
-        n, cost = self.n, self.costs[objective.moving]
+        n = self.n
         c, start, a_min, a_max = np.empty((4, 3, n))
         places, velocities, field = map(np.ascontiguousarray, objective[:3])
         known: Any = *state[:3], places, velocities, field, *self._cost_parts[objective.moving], c, start
@@ -177,13 +180,13 @@ class SeparationQp:
         of_planes, count = rows_within(*known)
         rows = of[:count], normals[:count], low[:count]
         problem = _Problem(c, start, *rows, a_min, a_max, whose[:of_planes], len(planes.wanted))
-        return self._by_active_set(problem, cost) or self._by_rows(problem, state, self._P[objective.moving])
+        return self._by_active_set(problem, self._effects[objective.moving]) or self._by_rows(problem, state, self._P[objective.moving])
 
-    def _by_active_set(self, problem: _Problem, cost: Cost) -> Answer | None:
+    def _by_active_set(self, problem: _Problem, effects: Effects) -> Answer | None:
         """Return the solution of what binds; None if there is none, or if it violates a row or bound."""
         rows: Any = problem[2:7]
         memory: Any = self._active, self._images, self._gram, self._missing
-        count = active_set(cost.inverse, problem.start, self.dt, self._maps, *rows, *memory)
+        count = active_set(*effects, problem.start, self.dt, *rows, *memory)
         if count < 0:
             return None
         try:

@@ -18,6 +18,7 @@ which costs less than a product with their matrix; that needs the rows' parts in
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +38,27 @@ _NEGATIVE = 1e-7
 
 
 @part
+def _step(k: int, axis: int, p: float, v: float, a: float, dt: float, results: Array) -> tuple[float, float]:
+    """Write the ``results`` of step ``k`` from ``p`` and ``v`` with ``a``; return those after it."""
+    results[5 * k, axis] = p
+    results[5 * k + 1, axis] = p + 0.5 * dt * v
+    p += dt * v + 0.5 * dt * dt * a
+    results[5 * k + 2, axis] = p
+    v += dt * a
+    results[5 * k + 3, axis] = v
+    return p, v
+
+
+@part
 def _motion(a: Array, more: float, dt: float, results: Array) -> None:
     """Write the ``results`` (5n, 3) of the motion from rest at 0 with ``more`` than each of ``a``."""
-    for axis in range(3):
-        p = v = 0.0
-        for k in range(a.shape[1]):
-            results[5 * k, axis] = p
-            results[5 * k + 1, axis] = p + 0.5 * dt * v
-            p += dt * v + 0.5 * dt * dt * (a[axis, k] + more)
-            results[5 * k + 2, axis] = p
-            v += dt * (a[axis, k] + more)
-            results[5 * k + 3, axis] = v
+    p = q = r = u = v = w = 0.0
+    # The axes take turns, so that none waits for its own last step.
+    for k in range(a.shape[1]):
+        p, u = _step(k, 0, p, u, a[0, k] + more, dt, results)
+        q, v = _step(k, 1, q, v, a[1, k] + more, dt, results)
+        r, w = _step(k, 2, r, w, a[2, k] + more, dt, results)
+        for axis in range(3):
             results[5 * k + 4, axis] = a[axis, k] - (a[axis, k - 1] if k > 0 else 0.0)
 
 
@@ -195,10 +206,21 @@ def write_rows(rows: NDArray[np.intp], of: NDArray[np.int64], c: Array, maps: Ar
 
 @part
 def _copy(source: Array, to: Array) -> None:
-    """Write ``source`` (3, n) to ``to``; an assignment of arrays compiles to ten times the machine code."""
-    for axis in range(3):
-        for i in range(source.shape[1]):
-            to[axis, i] = source[axis, i]
+    """Write the vector ``source`` to ``to``; an assignment of arrays compiles to ten times the machine code."""
+    for i in range(len(source)):
+        to[i] = source[i]
+
+
+@part
+def _along(y: Array, factors: Array, a: Array) -> float:
+    """Return the sum over the axes of ``factors`` (3,) times the product of ``y`` (n,) and ``a`` (3, n)."""
+    # A sum for each axis: the three do not wait for each other.
+    one = two = three = 0.0
+    for i in range(len(y)):
+        one += y[i] * a[0, i]
+        two += y[i] * a[1, i]
+        three += y[i] * a[2, i]
+    return float(factors[0] * one + factors[1] * two + factors[2] * three)
 
 
 @part
@@ -211,47 +233,61 @@ def _finite(a: Array) -> bool:
 
 
 @part
-def _inner(a: Array, b: Array) -> float:
-    """Return the sum of products of ``a`` and ``b`` (3, n)."""
-    # A sum for each axis: the three do not wait for each other.
-    one = two = three = 0.0
-    for i in range(a.shape[1]):
-        one += a[0, i] * b[0, i]
-        two += a[1, i] * b[1, i]
-        three += a[2, i] * b[2, i]
-    return one + two + three
+def _dot(a: Array, b: Array) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @part
 def _factor(M: Array, first: int, count: int, L: Array) -> None:
-    """Write rows ``first`` to ``count`` of the Cholesky factor ``L`` of M, whose rows before are known."""
+    """Write rows ``first`` to ``count`` of the Cholesky factor ``L`` of M, whose rows before are known.
+
+    On its diagonal are the reciprocals: a division takes several times as long as a product.
+    """
     for i in range(first, count):
         for j in range(i + 1):
             rest = M[i, j]
             for k in range(j):
                 rest -= L[i, k] * L[j, k]
-            L[i, j] = sqrt(max(rest, 1e-300)) if i == j else rest / L[j, j]
+            L[i, j] = 1.0 / sqrt(max(rest, 1e-300)) if i == j else rest * L[j, j]
 
 
 @part
 def _solve(L: Array, count: int, b: Array) -> None:
-    """Replace the first ``count`` entries of ``b`` by the solution y of L Lᵀ y = b."""
+    """Replace the first ``count`` entries of ``b`` by the solution y of L Lᵀ y = b; ``L``: by ``_factor``."""
     for i in range(count):
         for k in range(i):
             b[i] -= L[i, k] * b[k]
-        b[i] /= L[i, i]
+        b[i] *= L[i, i]
     for i in range(count - 1, -1, -1):
-        b[i] /= L[i, i]
+        b[i] *= L[i, i]
         for k in range(i):
             b[k] -= L[i, k] * b[i]
 
 
+class Effects(NamedTuple):
+    """What constraints on the results y, and then on the n accelerations, do to the minimiser of one cost.
+
+    ``of`` (6n, n): accelerations → results; ``images`` (6n, n): these times H; ``products`` (6n, 6n): the
+    images times the results.
+    """
+
+    of: Array
+    images: Array
+    products: Array
+
+
+def effects(H: Array, maps: Array) -> Effects:
+    """Return the effects for ``H`` (n, n) and ``maps`` (5, n, n), see ``active_set``."""
+    n = len(H)
+    of = np.ascontiguousarray(np.concatenate([maps.swapaxes(0, 1).reshape(5 * n, n), np.eye(n)]))
+    images: Array = np.ascontiguousarray(of @ H)
+    return Effects(of, images, np.ascontiguousarray(images @ of.T))
+
+
 @kernel(
     INT,
-    array(2),
-    array(2),
+    *[array(2)] * 4,
     FLOAT,
-    array(3),
     array(1, INT),
     array(2),
     array(1),
@@ -261,10 +297,11 @@ def _solve(L: Array, count: int, b: Array) -> None:
     *[output(1)] * 2,
 )
 def active_set(
-    H: Array,
+    results_of: Array,
+    images_of: Array,
+    products: Array,
     start: Array,
     dt: float,
-    maps: Array,
     of: NDArray[np.int64],
     c: Array,
     low: Array,
@@ -277,32 +314,53 @@ def active_set(
 ) -> int:
     """Write what binds at the minimiser; return its number, or −1 without a result.
 
-    ``start`` (3, n): the minimiser without inequalities; ``H`` (n, n): the inverse of the Hessian of each
-    axis on the space that the equalities leave. ``of``, ``c``, ``low``: the rows, see ``rows_within``.
-    ``x_min``, ``x_max`` (3, n): bounds. Written are, for up to C constraints, ``active`` (C,): rows, and from
-    their number R on the 3n lower and the 3n upper bounds; and the ``images`` H Nᵀ (C, 3, n) of their
-    normals N; the multipliers y minimise ½ yᵀ dual_P y + dual_cᵀ y: N H Nᵀ (C², filled from the beginning)
-    and the violations (C,) at the start, negative. −1 is also the result if more bind, or after
-    ``_MAX_STEPS``.
+    The first three are ``Effects`` of H (n, n), the inverse of the Hessian of each axis on the space that the
+    equalities leave. ``start`` (3, n): the minimiser without inequalities. ``of``, ``c``, ``low``: the rows,
+    see ``rows_within``. ``x_min``, ``x_max`` (3, n): bounds. Written are, for up to C constraints, ``active``
+    (C,): rows, and from their number R on the 3n lower and the 3n upper bounds; and the ``images`` H Nᵀ (C,
+    3, n) of their normals N; the multipliers y minimise ½ yᵀ dual_P y + dual_cᵀ y: N H Nᵀ (C², filled from
+    the beginning) and the violations (C,) at the start, negative. −1 is also the result if more bind, or
+    after ``_MAX_STEPS``.
     """
-    n, rows, room = len(H), len(low), len(active)
+    n, rows, room = start.shape[1], len(low), len(active)
     x, results = start.copy(), np.empty((5 * n, 3))
-    normal_of, gram, L = np.empty((room, 3, n)), np.empty((room, room)), np.empty((room, room))
-    multipliers, r, z = np.zeros(room + 1), np.empty(room), np.empty((3, n))
-    normal, image = np.empty((3, n)), np.empty((3, n))
+    # Of each active constraint: number of its result, and its factors of the axes.
+    y_of, c_of = np.empty(room, np.int64), np.empty((room, 3))
+    gram, L = np.empty((room, room)), np.empty((room, room))
+    multipliers, r, z, image = np.zeros(room + 1), np.empty(room), np.empty((3, n)), np.empty((3, n))
+    # Loops over all axes at once.
+    flat_x, flat_z, flat_image, flat_images = (x.ravel(), z.ravel(), image.ravel(), images.reshape(room, 3 * n))
     count, step = 0, 0
     if not (_finite(start) and _finite(x_min) and _finite(x_max)):
         return -1
-    for i in range(rows):
+    # The rows of each result y follow each other: ``first`` [y], and then ``after`` of each. ``nearest`` [y]:
+    # the least slack of these where y was at ``seen`` [y]; from there it falls by ``steepest`` times the way.
+    first, after = np.full(5 * n, -1), np.empty(rows, np.int64)
+    nearest, seen, steepest = np.full(5 * n, -np.inf), np.zeros((5 * n, 3)), 0.0
+    for i in range(rows - 1, -1, -1):
         if not np.isfinite(low[i]):
             return -1
+        after[i], first[of[i]] = first[of[i]], i
+        steepest = max(steepest, abs(c[i, 0]), abs(c[i, 1]), abs(c[i, 2]))
     while True:
         _motion(x, 0.0, dt, results)
         worst, violation = -1, -_TOLERANCE
-        for i in range(rows):
-            slack = _slack(i, of, c, low, results)
-            if slack < violation:
-                worst, violation = i, slack
+        for k in range(5 * n):
+            way = 0.0
+            for axis in range(3):
+                way += abs(results[k, axis] - seen[k, axis])
+            i = first[k]
+            if i < 0 or nearest[k] - steepest * way >= violation:
+                continue
+            nearest[k] = np.inf
+            for axis in range(3):
+                seen[k, axis] = results[k, axis]
+            while i >= 0:
+                slack = _slack(i, of, c, low, results)
+                nearest[k] = min(nearest[k], slack)
+                if slack < violation:
+                    worst, violation = i, slack
+                i = after[i]
         for axis in range(3):
             for j in range(n):
                 if x[axis, j] - x_min[axis, j] < violation:
@@ -314,28 +372,24 @@ def active_set(
                 for i in range(count):
                     dual_P[k * count + i] = gram[k, i]
             return count
-        # Normal n⁺ of the violated constraint, and H n⁺.
-        if worst < rows:
-            _write_row(worst, of, c, maps, normal)
-        else:
-            normal[:] = 0.0
-            bound = worst - rows
-            normal[bound // n % 3, bound % n] = 1.0 if bound < 3 * n else -1.0
-        for axis in range(3):
-            for i in range(n):
-                image[axis, i] = 0.0
-            for j in range(n):
-                if normal[axis, j] != 0.0:
-                    for i in range(n):
-                        image[axis, i] += normal[axis, j] * H[j, i]
-        short = violation
-        for axis in range(3):
-            for i in range(n):
-                short += normal[axis, i] * (start[axis, i] - x[axis, i])
         if count == room:
             return -1
-        for k in range(count):
-            gram[count, k] = gram[k, count] = _inner(normal_of[k], image)
+        # The violated constraint n⁺, and H n⁺.
+        y_of[count] = of[worst] if worst < rows else 5 * n + (worst - rows) % n
+        for axis in range(3):
+            if worst < rows:
+                c_of[count, axis] = c[worst, axis]
+            else:
+                side = (worst - rows) // n
+                c_of[count, axis] = (1.0 if side < 3 else -1.0) if side % 3 == axis else 0.0
+        y, factors = y_of[count], c_of[count]
+        for axis in range(3):
+            for i in range(n):
+                image[axis, i] = factors[axis] * images_of[y, i]
+        short = violation + _along(results_of[y], factors, start) - _along(results_of[y], factors, x)
+        for k in range(count + 1):
+            product = products[y_of[k], y] * _dot(c_of[k], factors)
+            gram[count, k] = gram[k, count] = product
         multiplier = 0.0
         while True:
             step += 1
@@ -345,12 +399,11 @@ def active_set(
             for k in range(count):
                 r[k] = gram[count, k]
             _solve(L, count, r)
-            _copy(image, z)
+            _copy(flat_image, flat_z)
             for k in range(count):
-                for axis in range(3):
-                    for i in range(n):
-                        z[axis, i] -= r[k] * images[k, axis, i]
-            curvature = _inner(z, normal)
+                for i in range(3 * n):
+                    flat_z[i] -= r[k] * flat_images[k, i]
+            curvature = _along(results_of[y], c_of[count], z)
             dual, dropped = np.inf, -1
             for k in range(count):
                 if r[k] > 1e-12 and multipliers[k] / r[k] < dual:
@@ -363,15 +416,12 @@ def active_set(
                 multipliers[k] -= length * r[k]
             multiplier += length
             if primal < np.inf:
-                for axis in range(3):
-                    for i in range(n):
-                        x[axis, i] += length * z[axis, i]
+                for i in range(3 * n):
+                    flat_x[i] += length * flat_z[i]
                 violation += length * curvature
             if primal <= dual:
                 active[count], multipliers[count], dual_c[count] = worst, multiplier, short
-                _copy(normal, normal_of[count])
-                _copy(image, images[count])
-                gram[count, count] = _inner(normal, image)
+                _copy(flat_image, flat_images[count])
                 count += 1
                 _factor(gram, count - 1, count, L)
                 break
@@ -382,11 +432,14 @@ def active_set(
             for k in range(dropped, count):
                 for i in range(count):
                     gram[i, k] = gram[i, k + 1]
+            for k in range(dropped, count):
+                y_of[k] = y_of[k + 1]
+                for axis in range(3):
+                    c_of[k, axis] = c_of[k + 1, axis]
             count -= 1
             for k in range(dropped, count):
                 active[k], multipliers[k], dual_c[k] = active[k + 1], multipliers[k + 1], dual_c[k + 1]
-                _copy(normal_of[k + 1], normal_of[k])
-                _copy(images[k + 1], images[k])
+                _copy(flat_images[k + 1], flat_images[k])
             _factor(gram, dropped, count, L)
 
 
@@ -426,7 +479,9 @@ def combine(
     bound (m, m/s, m/s²); ∞ if a multiplier is negative by more than rounding, as x is not the minimiser then.
     """
     n, worst, largest = start.shape[1], 0.0, 1.0
-    _copy(start, x)
+    for axis in range(3):
+        for i in range(n):
+            x[axis, i] = start[axis, i]
     for m in range(len(forces)):
         for axis in range(3):
             forces[m, axis] = 0.0

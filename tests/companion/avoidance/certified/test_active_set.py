@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from companion.avoidance.certified.rows import active_set, combine, write_rows
+from companion.avoidance.certified.rows import active_set, combine, effects, write_rows
 from companion.values.horizon import Array
 from companion.values.prediction import prediction
 
@@ -77,7 +77,7 @@ def find(qp: Qp) -> Found:
     n = len(qp.one)
     memory = np.zeros(MOST, np.int64), np.zeros((MOST, 3, n)), np.zeros(MOST * MOST), np.zeros(MOST)
     H: Array = np.asarray(np.linalg.inv(qp.one), dtype=np.float64)
-    count = active_set(H, qp.start, DT, qp.maps, *qp[3:], *memory)
+    count = active_set(*effects(H, qp.maps), qp.start, DT, *qp[3:], *memory)
     return Found(count, *memory)
 
 
