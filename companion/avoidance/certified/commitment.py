@@ -17,11 +17,12 @@ from companion.avoidance.certified.committed import (
     committed,
     committed_with_controls,
     controls,
+    controls_and_accelerations,
     horizon_of,
     resting,
     rounding,
 )
-from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
+from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes, mean_velocities
 from companion.avoidance.certified.mended_rounding import mended
 from companion.avoidance.certified.qp import Answer, Objective, SeparationQp, State
 from companion.avoidance.certified.separating_planes import Others, kept, planes
@@ -69,7 +70,7 @@ class Commitment:
         """Last epoch (µs) of which a plan was announced."""
         self.current: WirePlan | None = None
         # Caches of values derived from ``current``, and from both plans, which are needed several times.
-        self._carried_cache: tuple[WirePlan, WirePlan, Array] | None = None
+        self._carried_cache: tuple[WirePlan, WirePlan, Array, Array] | None = None
         self._horizon_cache: tuple[WirePlan, WirePlan | None, float | None, Horizon] | None = None
         self.following: WirePlan | None = None
         self.held: dict[HoldReason, int] = dict.fromkeys(HoldReason, 0)
@@ -182,13 +183,11 @@ class Commitment:
 
         Raises CompanionError without a committed plan.
         """
-        start, own = self._carried()
+        start, own, flown = self._carried()
         # Of the distance beyond the least one, an agreement leaves each side a half.
         spare = self._config.spare + 2.0 * outside
         corridor = planes(own, others, spare, upright=self._planar)
-        state = State(
-            start.position_m, start.velocity_m_s, self._last_acceleration(), start.accelerations_m_s2
-        )
+        state = State(start.position_m, start.velocity_m_s, self._last_acceleration(), flown)
         box = None
         if self._sides is not None:
             box = region(own, goal.place, self._sides - 2.0 * self._rounding.max())
@@ -232,9 +231,8 @@ class Commitment:
         others: Others,
     ) -> None:
         """Make ``plan``, with control points (n, 3, 3), m, that of the next epoch; learn from ``answer``."""
-        ways = np.zeros(answer.forces.shape)
-        ways[: len(others.controls)] = others.controls[:, -1, 2] - others.controls[:, 0, 0]
-        pushes = Pushes(answer.forces, ways / (1e-6 * self._config.dt_us * self._program.n))
+        length = 1e-6 * self._config.dt_us * self._program.n
+        pushes = Pushes(answer.forces, mean_velocities(others.controls, length, len(answer.forces)))
         moving = objective.moving
         gradient = self._program.costs[moving].gradient_per_metre
         seconds = 1e-6 * self._config.epoch_us
@@ -304,11 +302,11 @@ class Commitment:
             return np.zeros(3)
         return 1e-3 * np.array(self.current.accelerations[self._config.knots - 1], dtype=np.float64)
 
-    def _carried(self) -> tuple[WirePlan, Array]:
-        """Return the committed plan from the next epoch on, and its control points (n, 3, 3), m."""
+    def _carried(self) -> tuple[WirePlan, Array, Array]:
+        """Return the committed plan from the next epoch on, with its control points and accelerations."""
         if self.current is None:
             raise CompanionError("there is no committed plan yet")
         if self._carried_cache is None or self._carried_cache[0] is not self.current:
             plan = carried_on(self.current, self._config.knots)
-            self._carried_cache = self.current, plan, controls(plan)
+            self._carried_cache = self.current, plan, *controls_and_accelerations(plan)
         return self._carried_cache[1:]

@@ -92,6 +92,12 @@ def controls(plan: WirePlan) -> Array:
     return _controls_of(plan, accelerations_of(plan))
 
 
+def controls_and_accelerations(plan: WirePlan) -> tuple[Array, Array]:
+    """Return control points (n, 3, 3), m, and accelerations (n, 3), m/s², of the segments."""
+    units = accelerations_of(plan)
+    return _controls_of(plan, units), units * _MM
+
+
 def _controls_of(plan: WirePlan, accelerations: npt.NDArray[np.int64]) -> Array:
     points = np.empty((len(accelerations), 3, 3))
     _controls(plan.position, plan.velocity, accelerations, 0.5 * _MM * (plan.dt * 1e-6) ** 2, points)

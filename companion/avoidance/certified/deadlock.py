@@ -17,14 +17,17 @@ that turned with them would pass them on the far side, with the goal on the near
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from companion.config.certified import DeadlockConfig
 from companion.values.bearings import turned
+from companion.values.compiled import FLOAT, VOID, array, kernel, output, several
 from companion.values.horizon import Array
+
+Vector = tuple[float, float, float]
 
 _MIN_PULL_DISTANCE_M = 0.5
 """Distance of the goal below which the pull of the cost counts as constant."""
@@ -101,8 +104,8 @@ class DeadlockTurn:
         it then does not measure progress, and the turn stays below ``bend``.
         """
         config = self._config
-        offset = goal - rest
-        direct = sqrt(offset @ offset)
+        x, y, z = (goal - rest).tolist()
+        direct = sqrt(x * x + y * y + z * z)
         distance = direct + beyond
         approach_speed = np.inf if self._distance is None else (self._distance - distance) / seconds
         self._distance = distance
@@ -113,12 +116,15 @@ class DeadlockTurn:
         else:
             self._waited += seconds
         overtime = max(0.0, self._waited - config.patience)
-        direction = offset / max(direct, 1e-6)
-        push = pushes.forces.sum(axis=0) if moving else self._away(pushes, direction)
-        push_back = -float(push @ direction)
+        least = max(direct, 1e-6)
+        direction = x / least, y / least, z / least
+        # Without a side no push is left out.
+        aside = (0.0, 0.0, 0.0) if moving else _turned(direction, -self._sense * 0.5 * pi)
+        push = _counted(*pushes, direction, aside, config.chase)
+        push_back = -_dot(push, direction)
         if overtime > 0.0:
             # After ``patience`` without progress, a push back along the turned direction counts, too.
-            push_back = max(push_back, -float(push @ turned(direction, -self._sense * self.angle)))
+            push_back = max(push_back, -_dot(push, _turned(direction, -self._sense * self.angle)))
         pushed = min(max(push_back / (gradient_per_metre * max(direct, _MIN_PULL_DISTANCE_M)), 0.0), 1.0)
         pushed *= min(max(1.0 - approach_speed / config.speed, 0.0), 1.0)
         if pushed > config.pushed:
@@ -127,15 +133,51 @@ class DeadlockTurn:
         else:
             self.angle = max(0.0, self.angle - config.down * seconds / (1.0 + overtime))
 
-    def _away(self, pushes: Pushes, direction: Array) -> Array:
-        """Return the force (3,) that the turn answers, for a goal in ``direction`` (3,).
 
-        A vehicle that crosses to the side of the turn, and flies in about this direction as well, stays
-        beside a vehicle that turns: its push does not count.
-        """
-        aside = turned(direction, -self._sense * 0.5 * np.pi)
-        velocities = pushes.velocities / self._config.chase
-        # np.clip costs four times as much for arrays as small as these.
-        beside, ahead = (np.minimum(np.maximum(velocities @ way, 0.0), 1.0) for way in (aside, direction))
-        result: Array = (1.0 - beside * ahead) @ pushes.forces
-        return result
+def mean_velocities(controls: Array, seconds: float, count: int) -> Array:
+    """Return the mean velocities (count, 3), m/s, of plans of ``seconds``; zero for those without a plan.
+
+    ``controls`` (M, n, 3, 3), m: control points of the first M ≤ count.
+    """
+    found = np.zeros((count, 3))
+    _mean_velocities(np.ascontiguousarray(controls), seconds, found)
+    return found
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _turned(vector: Vector, angle: float) -> Vector:
+    """Return ``vector`` rotated about the vertical by ``angle`` (rad), see ``turned``."""
+    c, s = cos(angle), sin(angle)
+    x, y, z = vector
+    return c * x - s * y, s * x + c * y, z
+
+
+@kernel(VOID, array(4), FLOAT, output(2))
+def _mean_velocities(controls: Array, seconds: float, found: Array) -> None:
+    last = controls.shape[1] - 1
+    for m in range(len(controls)):
+        for axis in range(3):
+            found[m, axis] = (controls[m, last, 2, axis] - controls[m, 0, 0, axis]) / seconds
+
+
+@kernel(several(3), array(2), array(2), several(3), several(3), FLOAT)
+def _counted(forces: Array, velocities: Array, direction: Vector, aside: Vector, chase: float) -> Vector:
+    """Return the force that the turn answers, for a goal in ``direction``, with the turn to ``aside``.
+
+    A vehicle that crosses to the side of the turn, and flies in about this direction as well, stays beside a
+    vehicle that turns: its push does not count.
+    """
+    x = y = z = 0.0
+    for m in range(len(forces)):
+        beside = ahead = 0.0
+        for axis in range(3):
+            beside += velocities[m, axis] / chase * aside[axis]
+            ahead += velocities[m, axis] / chase * direction[axis]
+        counts = 1.0 - min(max(beside, 0.0), 1.0) * min(max(ahead, 0.0), 1.0)
+        x += counts * forces[m, 0]
+        y += counts * forces[m, 1]
+        z += counts * forces[m, 2]
+    return x, y, z

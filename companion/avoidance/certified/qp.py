@@ -180,7 +180,8 @@ class SeparationQp:
         of_planes, count = rows_within(*known)
         rows = of[:count], normals[:count], low[:count]
         problem = _Problem(c, start, *rows, a_min, a_max, whose[:of_planes], len(planes.wanted))
-        return self._by_active_set(problem, self._effects[objective.moving]) or self._by_rows(problem, state, self._P[objective.moving])
+        found = self._by_active_set(problem, self._effects[objective.moving])
+        return found or self._by_rows(problem, state, self._P[objective.moving])
 
     def _by_active_set(self, problem: _Problem, effects: Effects) -> Answer | None:
         """Return the solution of what binds; None if there is none, or if it violates a row or bound."""

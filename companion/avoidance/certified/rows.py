@@ -206,7 +206,7 @@ def write_rows(rows: NDArray[np.intp], of: NDArray[np.int64], c: Array, maps: Ar
 
 @part
 def _copy(source: Array, to: Array) -> None:
-    """Write the vector ``source`` to ``to``; an assignment of arrays compiles to ten times the machine code."""
+    """Write the vector ``source`` to ``to``; an assignment of arrays compiles to ten times the code."""
     for i in range(len(source)):
         to[i] = source[i]
 
@@ -329,7 +329,7 @@ def active_set(
     gram, L = np.empty((room, room)), np.empty((room, room))
     multipliers, r, z, image = np.zeros(room + 1), np.empty(room), np.empty((3, n)), np.empty((3, n))
     # Loops over all axes at once.
-    flat_x, flat_z, flat_image, flat_images = (x.ravel(), z.ravel(), image.ravel(), images.reshape(room, 3 * n))
+    flat_x, flat_z, flat_image, flat_images = x.ravel(), z.ravel(), image.ravel(), images.reshape(room, -1)
     count, step = 0, 0
     if not (_finite(start) and _finite(x_min) and _finite(x_max)):
         return -1
