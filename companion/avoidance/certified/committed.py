@@ -95,7 +95,8 @@ def controls(plan: WirePlan) -> Array:
 def controls_and_accelerations(plan: WirePlan) -> tuple[Array, Array]:
     """Return control points (n, 3, 3), m, and accelerations (n, 3), m/s², of the segments."""
     units = accelerations_of(plan)
-    return _controls_of(plan, units), units * _MM
+    found: Array = units.astype(np.float64) * _MM
+    return _controls_of(plan, units), found
 
 
 def _controls_of(plan: WirePlan, accelerations: npt.NDArray[np.int64]) -> Array:
