@@ -133,7 +133,11 @@ class FusedSource(Settings):
         " null: such detections are dropped",
     )
     height: float = Field(
-        1.8, gt=0.0, le=100.0, description="m, of the target, for cameras that send its place in the image"
+        1.8,
+        gt=0.0,
+        le=100.0,
+        description="m, of the target: for cameras that send its place in the image, and for the accuracy of"
+        " elevations, which none sends",
     )
     sigma_height: float = Field(0.15, gt=0.0, le=10.0, description="m, σ of that from image to image")
     sigma_row: float = Field(

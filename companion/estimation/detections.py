@@ -1,9 +1,12 @@
 """Detections of a target by cameras, as the fusion filter takes them.
 
 A detection says where the target is: along the ray with σ_s, which a known height of the target makes large,
-and across it with σ_t. CAMERA_TRACKING_GEO_STATUS gives the horizontal accuracy h = √(σ_along² + σ_t²) and
-the vertical one v; with the elevation β of the ray σ_along = σ_s cos β and v² = σ_s² sin² β + σ_t² cos² β, so
-σ_s² = h² + v² − 2σ_t². A message with a velocity is an estimate: a tracker has filtered it.
+and across it with σ_t sideways and σ_e up and down. CAMERA_TRACKING_GEO_STATUS gives σ_t as the accuracy of
+the heading, the horizontal accuracy h and the vertical one v. h² + v² is the trace σ_s² + σ_t² + σ_e². σ_e is
+not sent. A detector measures the column of an object in its middle and the row at its foot, with equal errors
+in pixels: the middle of a standing object seen from above is nearer than its foot, so its heading is known
+better. With the distances d of the foot and o of the top along the ray, σ_t/σ_e = 2o/(d + o)
+(``mavlink_bridge.pinhole.covariance``). A message with a velocity is an estimate: a tracker has filtered it.
 """
 
 from __future__ import annotations
@@ -22,6 +25,8 @@ _MAX_SIGMA_M, _MAX_BEARING_RAD, _MAX_DISTANCE_M = 100.0, 0.5, 2000.0
 """Accuracies and distances beyond these are absurd."""
 _MIN_SIGMA_M = 0.01
 """No camera is believed to be more accurate (m)."""
+_NEAREST_TOP = 0.5
+"""Least distance of an object's top along the ray, as a share of that of its foot."""
 _MIN_LEVEL = 1e-6
 """Cosine of a ray's elevation below which the ray counts as vertical."""
 
@@ -55,19 +60,28 @@ def detection(
     # Within these limits the places are finite.
     if not 1e-3 < distance <= _MAX_DISTANCE_M:
         return None
-    across, along = _accuracies(config, distance, hypot(x, y), message)
+    x, y, z = x / distance, y / distance, z / distance
+    top = max(distance + config.height * z, _NEAREST_TOP * distance)
+    taller = 1.0 if message.heading_accuracy is None else ((distance + top) / (2.0 * top)) ** 2
+    across, along = _accuracies(config, distance, hypot(x, y), taller, message)
     if not (0.0 < across <= _MAX_SIGMA_M and 0.0 < along <= _MAX_SIGMA_M):
         return None
-    x, y, z = x / distance, y / distance, z / distance
     level = hypot(x, y)
     # Straight below the camera the yaw moves nothing.
     up = (-z * x / level, -z * y / level, level) if level > _MIN_LEVEL else (1.0, 0.0, 0.0)
     wide, longer = across * across, along * along - across * across
-    xy, xz, yz = longer * x * y, longer * x * z, longer * y * z
+    a, b, c = up
+    more = wide * (taller - 1.0)
+    xx = wide + longer * x * x + more * a * a
+    yy = wide + longer * y * y + more * b * b
+    zz = wide + longer * z * z + more * c * c
+    xy = longer * x * y + more * a * b
+    xz = longer * x * z + more * a * c
+    yz = longer * y * z + more * b * c
     fields = np.array(
         (
             *place,
-            *(wide + longer * x * x, xy, xz, xy, wide + longer * y * y, yz, xz, yz, wide + longer * z * z),
+            *(xx, xy, xz, xy, yy, yz, xz, yz, zz),
             *(-y, x, 0.0),
             *up,
             *camera,
@@ -83,16 +97,17 @@ def detection(
 
 
 def _accuracies(
-    config: FusedSource, distance: float, level: float, message: CameraTrackingGeo
+    config: FusedSource, distance: float, level: float, taller: float, message: CameraTrackingGeo
 ) -> tuple[float, float]:
-    """Return σ across and along the ray, m; ∞ for absurd ones.
+    """Return σ across the ray, sideways, and along it, m; ∞ for absurd ones.
 
-    What the camera does not say is as configured.
+    ``level``: cosine of the ray's elevation; ``taller``: σ_e²/σ_t². What the camera does not say is as
+    configured.
     """
     heading = message.heading_accuracy
     horizontal, vertical = message.horizontal_accuracy, message.vertical_accuracy
     # The accuracy of a heading is an angle in the horizontal plane.
-    bearing = radians(config.sigma_bearing_deg) if heading is None else heading * level / distance
+    bearing = radians(config.sigma_bearing_deg) if heading is None else heading * level
     if heading is not None and not (heading > 0.0 and bearing <= _MAX_BEARING_RAD):
         return inf, inf
     across = max(distance * bearing, _MIN_SIGMA_M)
@@ -102,5 +117,5 @@ def _accuracies(
         return inf, inf
     if heading is None:
         across = max(min(across, horizontal, vertical), _MIN_SIGMA_M)
-    square = horizontal**2 + vertical**2 - 2.0 * across**2
+    square = horizontal**2 + vertical**2 - (1.0 + taller) * across**2
     return across, max(sqrt(max(square, 0.0)), across)

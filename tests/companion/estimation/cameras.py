@@ -18,13 +18,22 @@ from sitl.estimation.profiles import PROFILES, ProfileName
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 START = 1_767_225_600_000_000
 ALONG, ACROSS_DEG = 0.08, 0.12
-"""σ along the ray as a share of the distance, and across it."""
+"""σ along the ray as a share of the distance, and across it, sideways."""
+HEIGHT = 1.8
+"""m, of the target."""
 
 
 def source_of(profile: ProfileName, acceleration: float = 1.0) -> FusedSource:
     return FusedSource(
         kind="fused", own_errors=own_errors(PROFILES[profile]), sigma_acceleration=acceleration
     )
+
+
+def taller(ray) -> float:
+    """σ up and down, relative to that sideways, of an object that stands where ``ray`` (3,), m, ends."""
+    distance = float(np.linalg.norm(ray))
+    top = max(distance + HEIGHT * ray[2] / distance, 0.5 * distance)
+    return (distance + top) / (2.0 * top)
 
 
 def message(system: int, place, camera, along: float | None = None) -> CameraTrackingGeo:
@@ -35,13 +44,14 @@ def message(system: int, place, camera, along: float | None = None) -> CameraTra
     along = ALONG * distance if along is None else along
     across = radians(ACROSS_DEG) * distance
     cos, sin = level / distance, abs(ray[2]) / distance
+    upward = across * taller(ray)
     return CameraTrackingGeo(
         Source(system, 100),
         1,
         *FLEET.to_geodetic(np.asarray(place, dtype=float)),
         None,
-        horizontal_accuracy=hypot(hypot(along * cos, across * sin), across),
-        vertical_accuracy=hypot(along * sin, across * cos),
+        horizontal_accuracy=hypot(hypot(along * cos, upward * sin), across),
+        vertical_accuracy=hypot(along * sin, upward * cos),
         distance=distance,
         heading=atan2(ray[0], ray[1]),
         heading_accuracy=across / level,
@@ -88,7 +98,7 @@ class Vehicle:
         normal = self._random.normal(size=3)
         across = radians(ACROSS_DEG)
         heading = atan2(ray[1], ray[0]) + across * normal[0] * distance / level + float(self._yaw.value)
-        elevation = atan2(ray[2], level) + across * normal[1] + float(self._tilt.value)
+        elevation = atan2(ray[2], level) + across * taller(ray) * normal[1] + float(self._tilt.value)
         measured = distance * (1.0 + ALONG * normal[2])
         seen = measured * np.array(
             [np.cos(elevation) * np.cos(heading), np.cos(elevation) * np.sin(heading), np.sin(elevation)]
