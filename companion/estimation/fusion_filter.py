@@ -219,7 +219,8 @@ def _confirmed(memory: Array, row: Array) -> bool:
         memory[_REFUSED + 1 + a] = row[a]
     memory[_REFUSED] = _CONFIRMED_S
     apart = AGREE_M + AGREE_M_S * (_CONFIRMED_S - left)
-    return left > 0.0 and square <= apart * apart
+    agrees: bool = left > 0.0 and square <= apart * apart
+    return agrees
 
 
 @part
