@@ -37,10 +37,20 @@ class AnticipationConfig(Settings):
     """Turn of the goal to the side because of encounters that are predicted."""
 
     most: float = Field(0.0, ge=0.0, le=1.5, description="rad, the largest turn; 0 switches it off")
-    look: Positive = Field(3.0, description="s, the latest encounter that counts")
-    wide: float = Field(1.3, ge=1.0, le=5.0, description="distance wanted, in least distances of plans")
-    share: float = Field(
-        0.6, gt=0.0, le=1.0, description="part of the missing distance that each makes room for"
+    wide: float = Field(1.8, ge=1.0, le=5.0, description="distance wanted, in least distances of plans")
+    room: float = Field(
+        2.0,
+        gt=0.0,
+        le=5.0,
+        description="radius of the circle on which vehicles pass each other, in radii of the smallest one"
+        " that has room for them",
+    )
+    reach: Positive = Field(
+        1.2,
+        description="s: while somebody is met, the plan aims no further ahead than v_max flies in this time",
+    )
+    fresh: Positive = Field(
+        0.6, description="s: with agreements on plans that are older on average, ``reach`` is no limit"
     )
     wrong_side: float = Field(
         0.5,

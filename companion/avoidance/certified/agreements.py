@@ -8,7 +8,7 @@ agreement before it has begun anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -291,23 +291,19 @@ class Agreements:
                     found[system] = end
         return found
 
-    def newest(self) -> list[StoredPlan]:
-        """Return the newest plan of each peer that has not said farewell, by system id."""
-        return [plan for _, plan in sorted(self._newest().items())]
-
-    def _newest(self) -> dict[int, StoredPlan]:
+    def newest(self) -> dict[int, StoredPlan]:
         """Return the newest plan of each peer that has not said farewell, in the order of the peers."""
         known = ((s, peer.plans.newest) for s, peer in self._peers.items() if peer.left is None)
         return {system: plan for system, plan in known if plan is not None}
 
     def ends(self) -> dict[int, Array]:
         """Return where the newest plan of each peer that has not said farewell ends (3,), m, by system id."""
-        return {system: plan.controls[-1, 2] for system, plan in self._newest().items()}
+        return {system: plan.controls[-1, 2] for system, plan in self.newest().items()}
 
     @property
     def columns(self) -> frozenset[int]:
         """Systems whose newest plan is a column, without those that said farewell: they make no other."""
-        return frozenset(system for system, plan in self._newest().items() if plan.plan.column)
+        return frozenset(system for system, plan in self.newest().items() if plan.plan.column)
 
     @property
     def outside(self) -> float:
@@ -317,6 +313,15 @@ class Agreements:
     def kept(self) -> dict[int, tuple[Agreement, ...]]:
         """Return the agreements that the own plans keep, by system id, without those of departed vehicles."""
         return {system: peer.pair.kept for system, peer in self._peers.items() if peer.left is None}
+
+    def age(self, now: int, systems: Iterable[int]) -> float:
+        """Return the mean age (s), at ``now`` (µs), of the plans on which room beside ``systems`` rests.
+
+        Of a vehicle that is the oldest plan in an agreement that is kept; without any it does not count.
+        """
+        kept = self.kept()
+        oldest = [min(map(min, kept[system])) for system in systems if kept.get(system)]
+        return 1e-6 * (now - sum(oldest) / len(oldest)) if oldest else 0.0
 
     def missing(self) -> set[int]:
         """Return the members without an agreement that both vehicles state."""

@@ -1,74 +1,89 @@
 """Anticipation: turns the goal aside before the planes of other vehicles push a plan back.
 
 Planes push only once rest points are near each other. Vehicles that meet in one place turn aside there, and
-stand in each other's way. So the encounter is predicted: the rest point of each vehicle goes on as its newest
-plan does on average, and the own one towards the goal as fast as the own plan. Seen from above let them be
-nearest after the time t, with the other one at the signed distance m on the side away from the turn, and D
-the distance that is wanted. If m < D, the goal is turned by atan(share · (D − m) / (v t)), so that both
-vehicles together, each by ``share``, make room for D. Only the cost of the plan changes.
+stand in each other's way. So encounters are predicted from what changes least, and what a lost or late
+message changes least: the goals that vehicles tell each other. All are taken to fly straight to their goals
+from where they are, equally fast. Seen from above let two be nearest after a vehicle has flown ℓ, with the
+other one at the signed distance m on the side away from the turn, and D the distance that is wanted. The
+encounter has the weight w = 1 − m/D within [0, 1].
 
-Three kinds of encounters do not count: after more than ``look`` seconds or beyond the goal; one that passes
-more than ``wrong_side`` · D on the side of the turn, because it would have to be crossed; and, by as much as
-it flies to the side of the turn and ahead, one beside which the vehicle would stay (``DeadlockTurn``).
+Vehicles that all turn to one side fly round the place where they meet. K = 1 + Σ w of them have a distance of
+about D from each other on a circle of radius K D / 2π. So the goal is turned by atan(``room`` · min(1, Σ w) ·
+K D / (2π ℓ)), with the weighted mean of ℓ, and by ``most`` at most. While there is an encounter, the plan
+aims no further ahead than ``reach``, because rest points further ahead leave the others less room and do not
+make the vehicle faster. That is so while agreements rest on ``fresh`` plans: with old ones the planes follow
+late, and rest points must lie further ahead.
+
+Three kinds of encounters do not count: beyond one of the goals; one that passes more than ``wrong_side`` · D
+on the side of the turn, because it would have to be crossed; and, by as much as it flies to the side of the
+turn and ahead, one beside which the vehicle would stay (``DeadlockTurn``).
 """
 
 from __future__ import annotations
 
-from math import atan2, copysign, hypot
+from math import atan2, copysign, hypot, inf, pi
+from typing import NamedTuple
 
 from companion.config.certified import AnticipationConfig
 from companion.values.horizon import Array
 
-_NEAR_GOAL_M = 0.5
-"""Distance of the rest point from the goal below which nothing is anticipated."""
-_LEAST_SPEED_M_S = 0.3
-"""Own speed that is assumed at least, as at the beginning of a flight."""
-_MOVES_M_S = 0.2
-"""Speed from which another vehicle counts as moving."""
+_AT_GOAL_M = 0.5
+"""Distance from its goal below which a vehicle is not met, and beyond a goal within which it is."""
 _LEAST_WAY_M = 0.5
 
 
-def anticipated_turn(
-    config: AnticipationConfig,
-    wanted: float,
-    own: Array,
-    others: Array,
-    goal: Array,
-    seconds: float,
-    *,
-    sense: float,
-) -> float:
-    """Return the angle ≥ 0 (rad) by which to turn the ``goal`` (3,), m, to the side of ``sense``: +1 right.
+class Anticipated(NamedTuple):
+    """Turn ``angle`` ≥ 0 (rad) of the goal, and the ``reach`` (s) at full speed that plans may aim ahead."""
 
-    ``wanted`` (m): the least distance of plans. ``own`` (2, 3), m: where the own committed plan is at its
-    beginning and where it rests, ``seconds`` later. ``others`` (M, 2, 3), m: the same of the other vehicles'
-    newest plans, on the same clock.
+    angle: float
+    reach: float
+
+
+NOBODY = Anticipated(0.0, inf)
+
+
+def anticipated(
+    config: AnticipationConfig, wanted: float, own: Array, others: Array, *, sense: float
+) -> Anticipated:
+    """Return how to avoid encounters by a turn to the side of ``sense``: +1 right.
+
+    ``wanted`` (m): the least distance of plans. ``own`` (2, 3), m: where the own plan begins, and the goal.
+    ``others`` (M, 2, 3), m: where the other vehicles are then, and their goals.
     """
-    way = goal - own[1]
-    length = hypot(way[0], way[1])
-    if length < _NEAR_GOAL_M:
-        return 0.0
-    x, y = way[0] / length, way[1] / length
-    speed = max(hypot(*(own[1] - own[0])[:2]) / seconds, _LEAST_SPEED_M_S)
+    place, goal = own.tolist()
+    way, x, y = _direction(place, goal)
+    if way < _AT_GOAL_M:
+        return NOBODY
     distance = config.wide * wanted
-    largest = 0.0
-    for begin, rest in others.tolist():
-        velocity = (rest[0] - begin[0]) / seconds, (rest[1] - begin[1]) / seconds
-        level = abs(rest[2] - own[1, 2]) < distance
-        if not level or hypot(*velocity) < _MOVES_M_S:
+    weights = lengths = 0.0
+    for there, its_goal in others.tolist():
+        its_way, along, across = _direction(there, its_goal)
+        if its_way < _AT_GOAL_M or abs(there[2] - place[2]) >= distance:
             continue
-        u, v = velocity[0] - speed * x, velocity[1] - speed * y
-        closing = u * u + v * v
-        p, q = rest[0] - own[1, 0], rest[1] - own[1, 1]
-        after = -(p * u + q * v) / max(closing, 1e-3)
-        if not 0.0 < after <= config.look or speed * after > length + _NEAR_GOAL_M:
+        # Places relative to the own one change by (u, v) while the own vehicle flies a metre.
+        u, v = along - x, across - y
+        p, q = there[0] - place[0], there[1] - place[1]
+        length = -(p * u + q * v) / max(u * u + v * v, 1e-3)
+        if not 0.0 < length <= min(way, its_way) + _AT_GOAL_M:
             continue
-        p, q = p + after * u, q + after * v
+        p, q = p + length * u, q + length * v
         away = copysign(hypot(p, q), sense * (x * q - y * p))
         if not -config.wrong_side * distance <= away < distance:
             continue
-        beside = min(max(sense * (velocity[0] * y - velocity[1] * x), 0.0), 1.0)
-        ahead = min(max(velocity[0] * x + velocity[1] * y, 0.0), 1.0)
-        turn = atan2(config.share * (distance - away), max(speed * after, _LEAST_WAY_M))
-        largest = max(largest, (1.0 - beside * ahead) * turn)
-    return min(largest, config.most)
+        beside = max(sense * (along * y - across * x), 0.0)
+        ahead = max(along * x + across * y, 0.0)
+        weight = min(1.0 - away / distance, 1.0) * (1.0 - beside * ahead)
+        weights += weight
+        lengths += weight * length
+    if weights <= 0.0:
+        return NOBODY
+    radius = config.room * min(weights, 1.0) * (1.0 + weights) * distance / (2.0 * pi)
+    angle = atan2(radius, max(lengths / weights, _LEAST_WAY_M))
+    return Anticipated(min(angle, config.most), config.reach)
+
+
+def _direction(place: list[float], goal: list[float]) -> tuple[float, float, float]:
+    """Return the horizontal distance (m) from ``place`` to ``goal`` (m), and the direction."""
+    x, y = goal[0] - place[0], goal[1] - place[1]
+    length = hypot(x, y)
+    return (length, x / length, y / length) if length > 0.0 else (0.0, 0.0, 0.0)

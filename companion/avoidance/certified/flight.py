@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from math import hypot
+from math import hypot, inf
 
 import numpy as np
 
 from companion.avoidance.certified.agreements import Agreements
-from companion.avoidance.certified.anticipation import anticipated_turn
+from companion.avoidance.certified.anticipation import NOBODY, Anticipated, anticipated
 from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.commitment import Commitment, HoldReason
@@ -24,6 +24,7 @@ from companion.avoidance.certified.places import Places
 from companion.avoidance.certified.plan_sides import plan_sides
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.reservation import Reservation
+from companion.avoidance.certified.told_goals import ToldGoals
 from companion.avoidance.certified.vicinity import Vicinity
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
@@ -103,7 +104,8 @@ class CertifiedFlight:
         """Number of times that the vehicle left the tube."""
         self._outside = 0.0
         in_lanes = config.way is not None and config.way.lanes is not None
-        self._lane_goals = LaneGoals(own, fleet.fingerprint, self._way, in_use=in_lanes)
+        self._goals = ToldGoals(own, fleet.fingerprint)
+        self._lane_goals = LaneGoals(own.system, self._goals, self._way, in_use=in_lanes)
         self._in_lane = False
         self._in_control = self._announced = self._received = self._participated = False
         self._turn = 0
@@ -124,7 +126,7 @@ class CertifiedFlight:
             self.agreements.receive_plan(now, system, message.payload)
         elif message.payload_type == GOAL:
             try:
-                self._lane_goals.receive(system, message.payload)
+                self._goals.receive(now, system, message.payload)
             except PlanWireError:
                 self.agreements.refused += 1
             return
@@ -360,12 +362,14 @@ class CertifiedFlight:
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
         destination = self._places.destination(epoch, own[-1, 2], aim, self.agreements)
-        subgoal = self._subgoal(now, epoch, own[-1, 2], destination)
         anticipates = self._config.certified.anticipation.most > 0.0 and aim.path is None
-        turn = self._anticipated(epoch, own, subgoal.place) if anticipates else 0.0
+        self._goals.tell(destination if anticipates else None)
+        subgoal = self._subgoal(now, epoch, own[-1, 2], destination)
         goal = subgoal.place
         if not self._in_lane:
-            goal = self._deadlock_turn.turned(start.position_m, goal, turn)
+            met = self._met(now, start, goal) if anticipates else NOBODY
+            goal = self._deadlock_turn.turned(start.position_m, goal, met.angle)
+            goal = _no_further(start.position_m, goal, met.reach * min(self._config.limits.v_max[:2]))
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 
@@ -394,24 +398,20 @@ class CertifiedFlight:
             self._deadlock_turn.restart()
         return subgoal._replace(beyond=subgoal.beyond + goal.beyond)
 
-    def _anticipated(self, epoch: int, own: Array, goal: Array) -> float:
-        """Return the turn (rad) of ``goal`` (3,), m, for encounters with the peers' newest plans.
+    def _met(self, now: int, start: WirePlan, goal: Array) -> Anticipated:
+        """Return how to avoid encounters on the way from the ``start`` of the plan to ``goal`` (3,), m.
 
-        ``own`` (n, 3, 3), m: the committed control points from the epoch after ``epoch`` (µs) on. The other
-        plans are moved to its beginning, by their average velocities.
+        The others are where their newest plans are when this one begins.
         """
-        certified = self._config.certified
-        seconds, begins = float(self._seconds[-1]), epoch + certified.epoch_us
-        known = self.agreements.newest()
-        if not known:
-            return 0.0
-        others = np.array([[plan.controls[0, 0], plan.controls[-1, 2]] for plan in known])
-        ages = 1e-6 * np.array([begins - plan.plan.epoch for plan in known])
-        others += (others[:, 1:] - others[:, :1]) * (ages / seconds)[:, None, None]
-        ends, wanted = np.stack([own[0, 0], own[-1, 2]]), self._sources.between
-        return anticipated_turn(
-            certified.anticipation, wanted, ends, others, goal, seconds, sense=self._sense
-        )
+        begins, plans, told = start.epoch, self.agreements.newest(), self._goals.recent(now)
+        met = [system for system in sorted(told) if system in plans]
+        if not met:
+            return NOBODY
+        places = [plans[s].later(max(begins, plans[s].plan.epoch), 1)[0, 0] for s in met]
+        others = np.stack([places, [told[system].position_m for system in met]], axis=1)
+        config, own = self._config.certified.anticipation, np.stack([start.position_m, goal])
+        found = anticipated(config, self._sources.between, own, others, sense=self._sense)
+        return found if self.agreements.age(begins, met) <= config.fresh else found._replace(reach=inf)
 
     def _objective(self, begins: float, aim: Aim, goal: Array, field: Array) -> Objective:
         """Return the preferred places of a plan that begins in ``begins`` s and should end at ``goal`` (3,).
@@ -468,7 +468,7 @@ class CertifiedFlight:
         statements = self._statements(announced.epoch, every=True, farewell=farewell)
         plans = [announced, *self._repeated()]
         tunnels = [Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan)) for plan in plans]
-        return [*sync, *tunnels, *statements, *self._lane_goals.messages()]
+        return [*sync, *tunnels, *statements, *self._goals.messages()]
 
     def _away(self, now: int) -> list[Message]:
         """Return the statement that another controller flies the vehicle, if plans were announced before."""
@@ -495,3 +495,13 @@ class CertifiedFlight:
             agreements.fingerprint, epoch, agreements.since, entries, farewell, outside=self._outside
         )
         return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(part)) for part in in_messages(statement)]
+
+
+def _no_further(position: Array, goal: Array, most: float) -> Array:
+    """Return the place (3,), m, in the direction of ``goal`` that is at most ``most`` (m) away."""
+    offset = goal - position
+    length = float(np.sqrt(offset @ offset))
+    if length <= most:
+        return goal
+    result: Array = position + offset * (most / length)
+    return result

@@ -2,68 +2,95 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.anticipation import anticipated_turn
+from companion.avoidance.certified.anticipation import NOBODY, Anticipated, anticipated
+from companion.avoidance.certified.committed import horizon_of
 from companion.config.certified import AnticipationConfig
 from companion.values.bearings import turned
 from companion.values.horizon import Array
+from tests.companion.avoidance.certified.plans import EPOCH
+from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
 
-CONFIG = AnticipationConfig(most=0.35)
-WANTED, SECONDS = 1.25, 3.2
-GOAL = np.array([8.0, 0.0, 5.0])
-OWN = np.array([[-8.0, 0.0, 5.0], [-4.0, 0.0, 5.0]])
+CONFIG = AnticipationConfig(most=1.2)
+WANTED = 1.25
+OWN = np.array([[-8.0, 0.0, 5.0], [8.0, 0.0, 5.0]])
 places = st.floats(-12.0, 12.0).map(lambda x: round(x, 3))
 points = st.tuples(places, places, st.just(5.0))
 
 
-def turn(others: Array, config: AnticipationConfig = CONFIG, sense: float = 1.0) -> float:
-    return anticipated_turn(config, WANTED, OWN, others, GOAL, SECONDS, sense=sense)
+def found(others: Array, config: AnticipationConfig = CONFIG, sense: float = 1.0) -> Anticipated:
+    return anticipated(config, WANTED, OWN, others, sense=sense)
 
 
-def straight(begin: tuple[float, float], rest: tuple[float, float], height: float = 5.0) -> Array:
-    return np.array([[[*begin, height], [*rest, height]]])
+def straight(place: tuple[float, float], goal: tuple[float, float], height: float = 5.0) -> Array:
+    return np.array([[[*place, height], [*goal, height]]])
 
 
-ONCOMING = straight((6.0, 0.0), (2.0, 0.0))
+def ring(count: int) -> Array:
+    """Ways (count, 2, 3) of ``count`` that swap places across a circle; the first is that of ``OWN``."""
+    angles = np.pi + 2.0 * np.pi * np.arange(count) / count
+    starts = np.stack([8.0 * np.cos(angles), 8.0 * np.sin(angles), np.full(count, 5.0)], axis=1)
+    return np.stack([starts, starts * (-1.0, -1.0, 1.0)], axis=1)
+
+
+ONCOMING = straight((6.0, 0.0), (-8.0, 0.0))
 
 
 def test_two_that_meet_head_on_both_make_room() -> None:
-    """Both turn by the same angle, and together, by 60 % each, by more than the distance that they want."""
-    mine = turn(ONCOMING)
-    theirs = anticipated_turn(CONFIG, WANTED, ONCOMING[0], OWN[None], -GOAL + [0, 0, 10], SECONDS, sense=1.0)
-    assert mine == pytest.approx(theirs)
-    assert 2.0 * 3.0 * np.tan(mine) >= CONFIG.wide * WANTED
+    """Both turn by the same angle, by which together they pass further apart than plans must be."""
+    mine = found(ONCOMING)
+    theirs = anticipated(CONFIG, WANTED, ONCOMING[0], OWN[None], sense=1.0)
+    assert mine.angle == pytest.approx(theirs.angle)
+    assert 2.0 * 7.0 * np.tan(mine.angle) >= WANTED
+    assert mine.reach == CONFIG.reach
+
+
+@pytest.mark.parametrize("count", [3, 4, 6, 8])
+def test_vehicles_that_meet_in_one_place_pass_on_a_circle_with_room_for_all(count: int) -> None:
+    """Places that far beside the meeting place, one of each vehicle, are as far apart as plans must be."""
+    all_ways = ring(count)
+    turns = [
+        anticipated(CONFIG, WANTED, all_ways[k], np.delete(all_ways, k, axis=0), sense=1.0).angle
+        for k in range(count)
+    ]
+    assert turns == pytest.approx([turns[0]] * count)
+    radius = 8.0 * np.sin(turns[0])
+    assert 2.0 * radius * np.sin(np.pi / count) >= WANTED
 
 
 @pytest.mark.parametrize(
     "others",
     [
         pytest.param(np.empty((0, 2, 3)), id="nobody"),
-        pytest.param(straight((8.0, 0.0), (8.0, 0.0)), id="rests"),
-        pytest.param(straight((6.0, 3.0), (2.0, 3.0)), id="passes on the side away from the turn"),
-        pytest.param(straight((6.0, -3.0), (2.0, -3.0)), id="passes on the side of the turn"),
-        pytest.param(straight((-9.0, 0.0), (-12.0, 0.0)), id="flies away"),
-        pytest.param(straight((6.0, 0.0), (2.0, 0.0), 9.0), id="flies above"),
-        pytest.param(straight((60.0, 0.0), (56.0, 0.0)), id="beyond the goal"),
+        pytest.param(straight((4.0, 0.0), (4.0, 0.0)), id="is at its goal"),
+        pytest.param(straight((6.0, 4.0), (-8.0, 4.0)), id="passes on the side away from the turn"),
+        pytest.param(straight((6.0, -4.0), (-8.0, -4.0)), id="passes on the side of the turn"),
+        pytest.param(straight((-9.0, 0.0), (-18.0, 0.0)), id="flies away"),
+        pytest.param(straight((6.0, 0.0), (-8.0, 0.0), 9.0), id="flies above"),
+        pytest.param(straight((30.0, 0.0), (-8.0, 0.0)), id="is met beyond the goal"),
+        pytest.param(straight((6.0, 0.0), (4.0, 0.0)), id="is at its goal before"),
     ],
 )
 def test_who_is_not_met_is_not_turned_away_from(others: Array) -> None:
-    assert turn(others) == 0.0
+    assert found(others) == NOBODY == Anticipated(0.0, inf)
 
 
+@settings(max_examples=40)
 @given(st.lists(st.tuples(points, points), max_size=5))
 def test_the_turn_is_bounded_and_the_same_from_each_side(ends: list[tuple[tuple[float, ...], ...]]) -> None:
     """It does not depend on the order; a mirror changes the sense."""
     others = np.array(ends).reshape(-1, 2, 3)
-    found = turn(others)
-    assert 0.0 <= found <= CONFIG.most
-    assert turn(others[::-1]) == found
-    assert turn(others * (1.0, -1.0, 1.0), sense=-1.0) == pytest.approx(found)
-    assert turn(others, AnticipationConfig(most=0.0)) == 0.0
+    one = found(others)
+    assert 0.0 <= one.angle <= CONFIG.most
+    assert found(others[::-1]).angle == pytest.approx(one.angle)
+    assert found(others * (1.0, -1.0, 1.0), sense=-1.0).angle == pytest.approx(one.angle)
+    assert found(others, AnticipationConfig(most=0.0)).angle == 0.0
 
 
 @given(st.floats(-np.pi, np.pi))
@@ -71,10 +98,48 @@ def test_directions_of_the_axes_do_not_count(angle: float) -> None:
     def seen(rows: Array) -> Array:
         return np.array([turned(row, angle) for row in rows.reshape(-1, 3)]).reshape(rows.shape)
 
-    found = anticipated_turn(CONFIG, WANTED, seen(OWN), seen(ONCOMING), seen(GOAL), SECONDS, sense=1.0)
-    assert found == pytest.approx(turn(ONCOMING), abs=1e-6)
+    here = anticipated(CONFIG, WANTED, seen(OWN), seen(ONCOMING), sense=1.0)
+    assert here.angle == pytest.approx(found(ONCOMING).angle, abs=1e-6)
 
 
 def test_who_flies_the_same_way_on_the_side_of_the_turn_does_not_count() -> None:
     """To turn with it would be to stay beside it."""
-    assert turn(straight((-8.0, 1.5), (-3.0, -1.5))) == 0.0
+    crosses = straight((-8.0, 2.0), (6.0, -2.0))
+    assert 0.0 < found(crosses).angle < found(crosses * (1.0, -1.0, 1.0)).angle
+
+
+def swap(most: float, *, old: bool = False) -> tuple[Swarm, float]:
+    """Two that swap places, 1 s after they begin; how far from the straight way they pass, m."""
+    starts = np.array([[-6.0, 0.0, 5.0], [6.0, 0.0, 5.0]])
+    chosen = {"anticipation": {"most": most, "fresh": 0.01 if old else 5.0}}
+    swarm = Swarm(starts, Rough(delay=20_000), [Habits()] * 2, 1, planar=True, settings=chosen)
+    ends = starts[::-1]
+    swarm.run(5_000_000, lambda since, system: (starts if since < 1_000_000 else ends)[system - 1])
+    plans = [plan for _, plan in sorted(swarm.vehicles[0].plans.items())]
+    return swarm, max(float(-plan.position_m[1]) for plan in plans)
+
+
+def test_two_that_swap_places_turn_aside_before_planes_push_and_stay_apart() -> None:
+    """The turn changes the cost alone: all laws hold as without it."""
+    swarm, aside = swap(1.2)
+    assert not swarm.faults()
+    flown = horizon_of(swarm.vehicles[0].plan(EPOCH + 2_600_000)).at(EPOCH + 2_600_000)
+    # To the right before the middle, where both are still far from each other.
+    assert flown.position[0] < -1.0
+    assert flown.position[1] < -0.3
+    assert aside > 0.5 * swarm.d
+
+
+def test_plans_reach_less_far_while_somebody_is_met_and_agreements_are_fresh() -> None:
+    def furthest(swarm: Swarm) -> float:
+        ends = [
+            plan.positions_m()[-1] - plan.position_m
+            for vehicle in swarm.vehicles
+            for epoch, plan in vehicle.plans.items()
+            if epoch < EPOCH + 2_400_000
+        ]
+        return float(np.linalg.norm(ends, axis=1).max())
+
+    near, far = (furthest(swap(1.2, old=old)[0]) for old in (False, True))
+    reach = CONFIG.reach * 5.0
+    assert near < reach + 0.05 < far

@@ -1,0 +1,53 @@
+"""Goals that vehicles tell each other, so that each knows where the others fly to.
+
+A vehicle tells its goal, and whether it has been there, in a TUNNEL of its own with each transmission of its
+plan. Nothing that certifies separation depends on it.
+"""
+
+from __future__ import annotations
+
+from companion.values.horizon import Array
+from mavlink_bridge.messages import Message, Source, Tunnel
+from mavlink_bridge.wire.goal import PAYLOAD_TYPE, WireGoal, goal_at, pack, unpack
+
+_VALID_US = 2_000_000
+"""Time (µs) for which a goal is that of its vehicle; one that has none tells none."""
+
+
+class ToldGoals:
+    """Own goal and those received, of the vehicle ``own`` in the frame ``origin`` (8-bit fingerprint)."""
+
+    def __init__(self, own: Source, origin: int) -> None:
+        self._own, self._origin = own, origin
+        self._received: dict[int, tuple[int, WireGoal]] = {}
+        self._goal: tuple[Array, bool] | None = None
+
+    def receive(self, now: int, system: int, payload: bytes) -> None:
+        """Keep the goal that ``system`` tells at ``now`` (µs), unless it is in another frame.
+
+        Raises PlanWireError if it cannot be decoded.
+        """
+        goal = unpack(payload)
+        if goal.origin == self._origin:
+            self._received[system] = now, goal
+
+    def last(self, system: int) -> WireGoal | None:
+        """Return the last goal that ``system`` has told; None: it has told none."""
+        found = self._received.get(system)
+        return None if found is None else found[1]
+
+    def recent(self, now: int) -> dict[int, WireGoal]:
+        """Return the goals that are valid at ``now`` (µs), by system id."""
+        return {s: goal for s, (time, goal) in self._received.items() if now - time <= _VALID_US}
+
+    def tell(self, goal: Array | None, *, reached: bool = False) -> None:
+        """Tell the ``goal`` (3,), m, from now on, and whether it was ``reached``; None: tell none."""
+        self._goal = None if goal is None else (goal, reached)
+
+    def messages(self) -> list[Message]:
+        """Return the message of the own goal, if it is told."""
+        if self._goal is None:
+            return []
+        goal, reached = self._goal
+        told = goal_at(goal, self._origin, reached=reached)
+        return [Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(told))]
