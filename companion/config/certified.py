@@ -37,7 +37,9 @@ class AnticipationConfig(Settings):
     """Turn of the goal to the side because of encounters that are predicted."""
 
     most: float = Field(0.0, ge=0.0, le=1.5, description="rad, the largest turn; 0 switches it off")
-    wide: float = Field(1.8, ge=1.0, le=5.0, description="distance wanted, in least distances of plans")
+    wide: Positive = Field(
+        0.2, description="s: wanted distance beyond the least one of plans, that v_max flies in this time"
+    )
     room: float = Field(
         2.0,
         gt=0.0,

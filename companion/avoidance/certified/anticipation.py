@@ -4,8 +4,8 @@ Planes push only once rest points are near each other. Vehicles that meet in one
 stand in each other's way. So encounters are predicted from what changes least, and what a lost or late
 message changes least: the goals that vehicles tell each other. All are taken to fly straight to their goals
 from where they are, equally fast. Seen from above let two be nearest after a vehicle has flown ℓ, with the
-other one at the signed distance m on the side away from the turn, and D the distance that is wanted. The
-encounter has the weight w = 1 − m/D within [0, 1].
+other one at the signed distance m on the side away from the turn, and let D be the least distance of plans
+plus ``wide`` · v_max. The encounter has the weight w = 1 − m/D within [0, 1].
 
 Vehicles that all turn to one side fly round the place where they meet. K = 1 + Σ w of them have a distance of
 about D from each other on a circle of radius K D / 2π. So the goal is turned by atan(``room`` · min(1, Σ w) ·
@@ -33,28 +33,29 @@ _LEAST_WAY_M = 0.5
 
 
 class Anticipated(NamedTuple):
-    """Turn ``angle`` ≥ 0 (rad) of the goal, and the ``reach`` (s) at full speed that plans may aim ahead."""
+    """Turn ``angle`` ≥ 0 (rad) of the goal, and the distance (m) that plans may aim ``ahead``."""
 
     angle: float
-    reach: float
+    ahead: float
 
 
 NOBODY = Anticipated(0.0, inf)
 
 
 def anticipated(
-    config: AnticipationConfig, wanted: float, own: Array, others: Array, *, sense: float
+    config: AnticipationConfig, least: float, speed: float, own: Array, others: Array, *, sense: float
 ) -> Anticipated:
     """Return how to avoid encounters by a turn to the side of ``sense``: +1 right.
 
-    ``wanted`` (m): the least distance of plans. ``own`` (2, 3), m: where the own plan begins, and the goal.
-    ``others`` (M, 2, 3), m: where the other vehicles are then, and their goals.
+    ``least`` (m): the least distance of plans. ``speed`` (m/s): the largest one of the own plans. ``own``
+    (2, 3), m: where the own plan begins, and the goal. ``others`` (M, 2, 3), m: where the other vehicles are
+    then, and their goals.
     """
     place, goal = own.tolist()
     way, x, y = _direction(place, goal)
     if way < _AT_GOAL_M:
         return NOBODY
-    distance = config.wide * wanted
+    distance = least + config.wide * speed
     weights = lengths = 0.0
     for there, its_goal in others.tolist():
         its_way, along, across = _direction(there, its_goal)
@@ -71,15 +72,15 @@ def anticipated(
         if not -config.wrong_side * distance <= away < distance:
             continue
         beside = max(sense * (along * y - across * x), 0.0)
-        ahead = max(along * x + across * y, 0.0)
-        weight = min(1.0 - away / distance, 1.0) * (1.0 - beside * ahead)
+        forward = max(along * x + across * y, 0.0)
+        weight = min(1.0 - away / distance, 1.0) * (1.0 - beside * forward)
         weights += weight
         lengths += weight * length
     if weights <= 0.0:
         return NOBODY
     radius = config.room * min(weights, 1.0) * (1.0 + weights) * distance / (2.0 * pi)
     angle = atan2(radius, max(lengths / weights, _LEAST_WAY_M))
-    return Anticipated(min(angle, config.most), config.reach)
+    return Anticipated(min(angle, config.most), config.reach * speed)
 
 
 def _direction(place: list[float], goal: list[float]) -> tuple[float, float, float]:

@@ -369,7 +369,7 @@ class CertifiedFlight:
         if not self._in_lane:
             met = self._met(now, start, goal) if anticipates else NOBODY
             goal = self._deadlock_turn.turned(start.position_m, goal, met.angle)
-            goal = _no_further(start.position_m, goal, met.reach * min(self._config.limits.v_max[:2]))
+            goal = _no_further(start.position_m, goal, met.ahead)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 
@@ -410,8 +410,9 @@ class CertifiedFlight:
         places = [plans[s].later(max(begins, plans[s].plan.epoch), 1)[0, 0] for s in met]
         others = np.stack([places, [told[system].position_m for system in met]], axis=1)
         config, own = self._config.certified.anticipation, np.stack([start.position_m, goal])
-        found = anticipated(config, self._sources.between, own, others, sense=self._sense)
-        return found if self.agreements.age(begins, met) <= config.fresh else found._replace(reach=inf)
+        least, speed = self._sources.between, min(self._config.limits.v_max[:2])
+        found = anticipated(config, least, speed, own, others, sense=self._sense)
+        return found if self.agreements.age(begins, met) <= config.fresh else found._replace(ahead=inf)
 
     def _objective(self, begins: float, aim: Aim, goal: Array, field: Array) -> Objective:
         """Return the preferred places of a plan that begins in ``begins`` s and should end at ``goal`` (3,).

@@ -18,14 +18,14 @@ from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
 
 CONFIG = AnticipationConfig(most=1.2)
-WANTED = 1.25
+LEAST, SPEED = 1.25, 5.0
 OWN = np.array([[-8.0, 0.0, 5.0], [8.0, 0.0, 5.0]])
 places = st.floats(-12.0, 12.0).map(lambda x: round(x, 3))
 points = st.tuples(places, places, st.just(5.0))
 
 
 def found(others: Array, config: AnticipationConfig = CONFIG, sense: float = 1.0) -> Anticipated:
-    return anticipated(config, WANTED, OWN, others, sense=sense)
+    return anticipated(config, LEAST, SPEED, OWN, others, sense=sense)
 
 
 def straight(place: tuple[float, float], goal: tuple[float, float], height: float = 5.0) -> Array:
@@ -45,10 +45,10 @@ ONCOMING = straight((6.0, 0.0), (-8.0, 0.0))
 def test_two_that_meet_head_on_both_make_room() -> None:
     """Both turn by the same angle, by which together they pass further apart than plans must be."""
     mine = found(ONCOMING)
-    theirs = anticipated(CONFIG, WANTED, ONCOMING[0], OWN[None], sense=1.0)
+    theirs = anticipated(CONFIG, LEAST, SPEED, ONCOMING[0], OWN[None], sense=1.0)
     assert mine.angle == pytest.approx(theirs.angle)
-    assert 2.0 * 7.0 * np.tan(mine.angle) >= WANTED
-    assert mine.reach == CONFIG.reach
+    assert 2.0 * 7.0 * np.tan(mine.angle) >= LEAST
+    assert mine.ahead == CONFIG.reach * SPEED
 
 
 @pytest.mark.parametrize("count", [3, 4, 6, 8])
@@ -56,12 +56,12 @@ def test_vehicles_that_meet_in_one_place_pass_on_a_circle_with_room_for_all(coun
     """Places that far beside the meeting place, one of each vehicle, are as far apart as plans must be."""
     all_ways = ring(count)
     turns = [
-        anticipated(CONFIG, WANTED, all_ways[k], np.delete(all_ways, k, axis=0), sense=1.0).angle
+        anticipated(CONFIG, LEAST, SPEED, all_ways[k], np.delete(all_ways, k, axis=0), sense=1.0).angle
         for k in range(count)
     ]
     assert turns == pytest.approx([turns[0]] * count)
     radius = 8.0 * np.sin(turns[0])
-    assert 2.0 * radius * np.sin(np.pi / count) >= WANTED
+    assert 2.0 * radius * np.sin(np.pi / count) >= LEAST
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_directions_of_the_axes_do_not_count(angle: float) -> None:
     def seen(rows: Array) -> Array:
         return np.array([turned(row, angle) for row in rows.reshape(-1, 3)]).reshape(rows.shape)
 
-    here = anticipated(CONFIG, WANTED, seen(OWN), seen(ONCOMING), sense=1.0)
+    here = anticipated(CONFIG, LEAST, SPEED, seen(OWN), seen(ONCOMING), sense=1.0)
     assert here.angle == pytest.approx(found(ONCOMING).angle, abs=1e-6)
 
 
@@ -141,5 +141,5 @@ def test_plans_reach_less_far_while_somebody_is_met_and_agreements_are_fresh() -
         return float(np.linalg.norm(ends, axis=1).max())
 
     near, far = (furthest(swap(1.2, old=old)[0]) for old in (False, True))
-    reach = CONFIG.reach * 5.0
+    reach = CONFIG.reach * SPEED
     assert near < reach + 0.05 < far
