@@ -14,8 +14,9 @@ from companion.avoidance.certified.committed import horizon_of
 from companion.config.certified import AnticipationConfig
 from companion.values.bearings import turned
 from companion.values.horizon import Array
+from mavlink_bridge.wire.goal import goal_at, pack
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.swarm import FLEET, Habits, Rough, Swarm
 
 CONFIG = AnticipationConfig(most=1.2)
 LEAST, SPEED = 1.25, 5.0
@@ -143,3 +144,9 @@ def test_plans_reach_less_far_while_somebody_is_met_and_agreements_are_fresh() -
     near, far = (furthest(swap(1.2, old=old)[0]) for old in (False, True))
     reach = CONFIG.reach * SPEED
     assert near < reach + 0.05 < far
+
+
+def test_goals_are_told_only_where_it_is_on() -> None:
+    ends = {pack(goal_at(np.array([x, 0.0, 5.0]), FLEET.fingerprint)) for x in (-6.0, 6.0)}
+    assert not ends & set(swap(0.0)[0].sent)
+    assert ends <= set(swap(1.2)[0].sent)
