@@ -177,8 +177,7 @@ class Fusion:
             if older:
                 vehicles = np.concatenate([[system for system, _ in older], vehicles])
                 weights = np.concatenate([[weight for _, weight in older], weights])
-        order = weights.argsort()
-        ordered = weights[order[vehicles[order].argsort(kind="stable")]].tolist()
+        ordered = weights[np.lexsort((weights, vehicles))].tolist()
         found, first = {}, 0
         for system, number in enumerate(np.bincount(vehicles).tolist()):
             if number:
