@@ -136,8 +136,9 @@ class RatesConfig(Settings):
         ge=0,
         le=5_000_000,
         multiple_of=4,
-        description="µs from the first message of the own state to the first of the own plan (field); 0: "
-        "both are in one datagram, which is lost as a whole; half of state_us: each is lost alone",
+        description="µs from the first message of the own state to the first of the own plan (field). If"
+        " plan_us and state_us are equal: with 0 both are in one datagram, which is lost as a whole; with"
+        " half of state_us each has a datagram of its own",
     )
     detection_us: Micros = Field(
         100_000, description="µs between two forwarded detections, at least (target_source: fused)"

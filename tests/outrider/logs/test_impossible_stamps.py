@@ -45,7 +45,8 @@ def used(name: str, ended: Ended, damaged: int) -> int:
     lines = [line for line in ended.err.splitlines() if "damaged" in line]
     assert len(lines) == (damaged > 0)
     for line in lines:
-        assert line.startswith(f"a.tlog: {damaged} records are damaged")
+        assert line.startswith(f"a.tlog: damaged at {damaged} places (")
+        assert "the rest" not in line
     assert found["finite"]
     records = found["records"]
     assert isinstance(records, int)

@@ -73,7 +73,7 @@ class Flying(ABC):
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """So far."""
+        """The events in ``events.jsonl`` up to now, without a line that is not written to its end."""
         path = self.directory / "events.jsonl"
         if not path.exists():
             return []
@@ -104,12 +104,12 @@ class Flying(ABC):
         self.until(lambda: any(event["what"] == what and text in event["text"] for event in self.events))
 
     def wait(self, seconds: float) -> None:
-        """So long."""
+        """Wait for ``seconds`` (s) of the clock."""
         end = self.now() + seconds
         self.until(lambda: self.now() > end)
 
     def order(self, word: str) -> None:
-        """As typed."""
+        """Write ``word`` and a new line to the standard input of the process."""
         assert self.process.stdin is not None
         self.process.stdin.write(f"{word}\n")
         self.process.stdin.flush()
@@ -121,7 +121,10 @@ class Flying(ABC):
         return int(last.rpartition(" ")[2])
 
     def end(self, which: signal.Signals | None = None) -> tuple[int, dict[str, Any]]:
-        """Status and summary; with a signal first, or by itself."""
+        """Wait for the end of the process, after the signal ``which`` if there is one.
+
+        Return its exit status and its summary.
+        """
         if which is not None:
             self.process.send_signal(which)
         end = self.now() + PATIENCE

@@ -62,7 +62,10 @@ class Turns:
 
 
 class Conductor:
-    """The test's side: gives each process its turn when its time has come; ``now``: of the clock, µs."""
+    """The test's side: gives each process its turn when its time has come.
+
+    ``now``: time of the clock, µs.
+    """
 
     def __init__(self, start: int) -> None:
         self.now = start
@@ -82,7 +85,10 @@ class Conductor:
         return not self._waiting
 
     def advance(self, until: int) -> None:
-        """One turn of who waits for the earliest time; without anybody before ``until`` (µs), none."""
+        """Give a turn to the process that waits for the earliest time.
+
+        If no process waits for a time before ``until`` (µs), no process gets a turn, and it is ``until``.
+        """
         self._listen()
         end, instant = min(self._waiting.items(), key=lambda item: item[1], default=(None, until))
         if end is None or instant >= until:
@@ -91,12 +97,12 @@ class Conductor:
         self.now = max(self.now, instant)
         del self._waiting[end]
         self._running.append(end)
-        with suppress(OSError):  # It has been killed: it is heard to be gone.
+        with suppress(OSError):  # The process has been killed; ``_listen`` removes it.
             end.sendall(_WORD.pack(_GOES_ON, self.now))
         self._listen()
 
     def close(self) -> None:
-        """Who still waits ends."""
+        """Close all ends: a process that waits, or will wait, raises SystemExit."""
         for end in (*self._waiting, *self._running):
             end.close()
 
@@ -105,7 +111,7 @@ class Conductor:
         self._running.append(end)
 
     def _listen(self) -> None:
-        """Until everybody waits or has ended."""
+        """Read from the processes until each of them waits or has ended."""
         while self._running:
             end = self._running[-1]
             try:

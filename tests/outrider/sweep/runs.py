@@ -79,6 +79,11 @@ def stuck_or_broken(task: Task) -> dict[str, Any]:
     return {**breaks(task), "converged": False, "convergence_time_s": None}
 
 
+def only_others(task: Task) -> dict[str, Any]:
+    """All converge but a vehicle whose companion has ended for good."""
+    return {**fine(task), "converged": False, "convergence_time_s": None, "others_converge_s": 6.2}
+
+
 def no_json(task: Task) -> dict[str, Any]:
     """Values that JSON does not have."""
     return {"min_separation_m": float("nan")}

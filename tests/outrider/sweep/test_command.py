@@ -252,3 +252,17 @@ def test_the_worst_come_first_violations_before_all(fly: Fly, capsys: pytest.Cap
     order = ["violation", "stuck", "nearest", "slowest"]
     assert kinds[0] == "violation"
     assert [order.index(kind) for kind in kinds] == sorted(order.index(kind) for kind in kinds)
+
+
+@pytest.mark.parametrize("kind", ["scenarios: [antipodal-8]", "scenes: [clutter]"])
+@pytest.mark.parametrize("arrival", ["all", "others"])
+def test_a_run_is_stuck_by_those_that_its_scenario_waits_for(
+    fly: Fly, capsys: pytest.CaptureFixture[str], kind: str, arrival: str
+) -> None:
+    key = "arrival" if "scenarios" in kind else "scenario.arrival"
+    text = f"name: methods\n{kind}\nruns: 2\nset: {{{key}: {arrival}}}\n"
+    Path("methods.yaml").write_text(text, encoding="utf-8")
+    stuck = 2 if arrival == "all" else 0
+    assert fly("only_others", as_json=True) == (1 if stuck else 0)
+    (cell,) = json.loads(capsys.readouterr().out)["cells"]
+    assert (cell["stuck"], cell["converged"]) == (stuck, 2 - stuck)

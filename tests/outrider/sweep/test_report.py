@@ -7,6 +7,7 @@ from io import StringIO
 from math import inf
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -122,9 +123,23 @@ def test_a_stuck_run_is_longer_than_every_other() -> None:
     assert found.converged_rate.value == 0.9
 
 
+@pytest.mark.parametrize("first", [None, 6.2])
+def test_a_run_that_waits_for_the_others_is_stuck_without_them_only(first: float | None) -> None:
+    """A vehicle whose companion has ended for good does not converge."""
+    flown = entry(1, converged=False, convergence_time_s=None, others_converge_s=first)
+    assert run_of(flown).ending is Ending.STUCK
+    found = run_of(flown, others=True)
+    stuck = first is None
+    assert (found.ending is Ending.STUCK, found.converged) == (stuck, not stuck)
+    assert found.seconds == (inf if stuck else first)
+    violated = entry(1, converged=False, others_converge_s=first, d_min_violations=1)
+    assert run_of(violated, others=True).ending is Ending.VIOLATION
+
+
 def test_an_escort_has_no_time_to_converge() -> None:
     found = report([entry(seed, converged=None, convergence_time_s=None) for seed in range(5)])
     assert (found.converged, found.converged_rate, found.time_median, found.stuck) == (None, None, None, 0)
+    assert run_of(entry(1, converged=None, convergence_time_s=None), others=True).ending is Ending.FINE
     assert exit_status([found]) == 0
 
 

@@ -23,9 +23,8 @@ def document_of(found: ShadowRun) -> dict[str, object]:
     """Return the results for scripts.
 
     They describe the set-points that would have been sent and, under ``sent``, those that were sent;
-    ``apart_m`` has the 50th and 95th percentiles of the distance between the two. ``damaged_records`` have a
-    wrong checksum, or a stamp that is no time; frames of the second kind are used nevertheless, where the
-    reader has a time for them.
+    ``apart_m`` has the 50th and 95th percentiles of the distance between the two. ``damaged_records`` counts
+    as ``damaged_records`` does.
     """
     would, sent = facts(found.would), facts(found.sent)
     off = apart(course(found.would), course(found.sent))
@@ -42,7 +41,12 @@ def document_of(found: ShadowRun) -> dict[str, object]:
 
 
 def damaged_records(report: TlogReport, used: int) -> int:
-    """Return how many records of a log are damaged, after a pass that has used ``used`` of them."""
+    """Return how many records of a log are damaged, after a pass that has used ``used`` of them.
+
+    They are records with a wrong checksum, records whose stamp is no time, and stretches of bytes that are no
+    record, of which each counts once, however many records have been there. A frame with a right checksum and
+    without a possible stamp counts, and is used where the reader has a time for it.
+    """
     return report.bad + report.truncated + max(report.good - used, 0)
 
 
@@ -50,8 +54,11 @@ def damage(name: str, found: ShadowRun) -> str:
     """Return a line about the damaged records of the log ``name``, or an empty string."""
     if not found.damaged:
         return ""
-    records = "1 record is" if found.damaged == 1 else f"{found.damaged} records are"
-    return f"{name}: {records} damaged (a wrong checksum, or a stamp that is no time); the rest is used"
+    places = "1 place" if found.damaged == 1 else f"{found.damaged} places"
+    return (
+        f"{name}: damaged at {places} (a wrong checksum, bytes that are no record, or a stamp that is no"
+        " time); frames with a right checksum are used where a time is known for them"
+    )
 
 
 def leave(directory: Path, name: str, found: ShadowRun, document: dict[str, object]) -> None:

@@ -77,6 +77,13 @@ def task(cell: Cell, seed: int) -> Task:
     return Task(cell.key, seed, cell.document, cell.vehicle, cell.is_scene)
 
 
+def waits_for_others(cell: Cell) -> bool:
+    """Return whether the runs of ``cell`` wait only for vehicles whose companion does not end for good."""
+    document = json.loads(cell.document)
+    values = document["scenario"] if cell.is_scene else document
+    return values.get("arrival") == "others"
+
+
 def scenario_of(task: Task) -> Scenario:
     """Return the scenario that a task flies. A random scenario is the same each time."""
     if not task.is_scene:

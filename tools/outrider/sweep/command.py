@@ -18,7 +18,7 @@ from outrider.resources import find
 from outrider.runs import whole_file
 from outrider.sweep import directory as places
 from outrider.sweep import page, picture, regressions, tables
-from outrider.sweep.cells import Cell, cells, task
+from outrider.sweep.cells import Cell, cells, task, waits_for_others
 from outrider.sweep.execution import WALL_LIMIT_S, Workers, has_ended, header, work
 from outrider.sweep.flying import RUN
 from outrider.sweep.grid import Sweep
@@ -71,7 +71,8 @@ def sweep(
         tasks = [task(cell, seed) for seed in spec.seeds for cell in found]
         waiting = [one for one in tasks if not has_ended(journal, one)]
         labels = {cell.key: cell.label for cell in found}
-        with watching(len(tasks), len(tasks) - len(waiting)) as watch:
+        others = {cell.key for cell in found if waits_for_others(cell)}
+        with watching(len(tasks), len(tasks) - len(waiting), others) as watch:
             # Runs at every exit, after the bar is closed.
             open_.callback(_name_losses, watch, labels)
             stopped = None
@@ -170,4 +171,5 @@ def _report(folder: Path, cell: Cell, runs: Sequence[Run]) -> CellReport:
 
 
 def _runs(journal: Journal, cell: Cell, spec: Sweep) -> list[Run]:
-    return [run_of(journal.entries[cell.key, seed]) for seed in spec.seeds]
+    others = waits_for_others(cell)
+    return [run_of(journal.entries[cell.key, seed], others=others) for seed in spec.seeds]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -15,9 +15,15 @@ from outrider.terminal.progress_lines import ProgressLines
 
 
 class ResultCounter:
-    """Counter and display of the runs' results. ``lost`` holds every loss of this attempt, retried or not."""
+    """Counter and display of the runs' results. ``lost`` holds every loss of this attempt, retried or not.
 
-    def __init__(self, total: int, finished: int, bar: Progress | None) -> None:
+    ``others``: keys of the cells with ``arrival: others``.
+    """
+
+    def __init__(
+        self, total: int, finished: int, bar: Progress | None, others: Collection[str] = ()
+    ) -> None:
+        self._others = others
         self._total, self._before, self._left = total, finished, total - finished
         self._bar = bar
         self._began = time.monotonic()
@@ -29,7 +35,7 @@ class ResultCounter:
 
     def ended(self, entry: Entry) -> None:
         """Count a run that has ended."""
-        ending = run_of(entry).ending
+        ending = run_of(entry, others=entry.key in self._others).ending
         self._count[ending] += 1
         if ending is Ending.LOST:
             self.lost.append(entry)
@@ -59,11 +65,14 @@ class ResultCounter:
 
 
 @contextmanager
-def watching(total: int, finished: int) -> Iterator[ResultCounter]:
-    """Provide a `ResultCounter` of ``total`` runs, ``finished`` of which have ended already."""
+def watching(total: int, finished: int, others: Collection[str] = ()) -> Iterator[ResultCounter]:
+    """Provide a `ResultCounter` of ``total`` runs, ``finished`` of which have ended already.
+
+    ``others``: keys of the cells with ``arrival: others``.
+    """
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield ResultCounter(total, finished, None)
+        yield ResultCounter(total, finished, None, others)
         return
     columns = (
         BarColumn(),
@@ -71,7 +80,7 @@ def watching(total: int, finished: int) -> Iterator[ResultCounter]:
         TextColumn("{task.fields[words]}"),
     )
     with Progress(*columns, console=console, transient=True) as bar:
-        yield ResultCounter(total, finished, bar)
+        yield ResultCounter(total, finished, bar, others)
 
 
 def duration(seconds: float) -> str:

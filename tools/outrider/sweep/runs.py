@@ -47,10 +47,11 @@ class Run(NamedTuple):
     what: str | None
 
 
-def run_of(entry: Entry) -> Run:
+def run_of(entry: Entry, *, others: bool = False) -> Run:
     """Return the figures of an entry.
 
-    Figures that its summary does not have are None; ``violations`` is then 0.
+    Figures that its summary does not have are None; ``violations`` is then 0. ``others``: whether the run has
+    converged, and when, is decided without the vehicles whose companion ends for good (``arrival: others``).
     """
     if entry.summary is None:
         ending = Ending.LOST if entry.status == "lost" else Ending.FAULT
@@ -59,6 +60,10 @@ def run_of(entry: Entry) -> Run:
     summary = entry.summary
     converged = summary.get("converged")
     seconds = _number(summary.get("convergence_time_s"))
+    if others and converged is not None:
+        first = _number(summary.get("others_converge_s"))
+        seconds = seconds if first is None else first
+        converged = seconds is not None
     violations = int(_number(summary.get("d_min_violations")) or 0)
     failure = summary.get("failure")
     ending = (
