@@ -1,5 +1,7 @@
-"""The command ``outrider`` in a process that takes turns: ``python -m tests.outrider.onboard.in_turns FD …``,
-where FD is the socket to the ``Conductor``. Of ``fly``, both processes do."""
+"""The command ``outrider`` in a process that takes turns: ``python -m tests.outrider.onboard.in_turns FD …``.
+
+FD is the number of the socket to the ``Conductor``. Both processes of ``outrider fly`` take turns.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +9,13 @@ import socket
 import sys
 from collections.abc import Sequence
 from multiprocessing.connection import wait
+from queue import SimpleQueue
+from threading import Semaphore
 from types import SimpleNamespace
 from typing import Any
 
 from outrider.__main__ import main
-from outrider.onboard import clocks, command, flight
+from outrider.onboard import clocks, command, event_log, flight
 from outrider.onboard.child_process import Body, ChildProcess
 from outrider.onboard.process_channel import Channel, OrderLink
 from tests.outrider.onboard.turns import Turns
@@ -31,6 +35,34 @@ class _Child:
         self._body.main()
 
 
+class _Written:
+    """Queue whose ``put`` returns when the reader has used the item, and asks for the next one.
+
+    With it a line of the event log is in the file before its process waits for the clock.
+    """
+
+    def __init__(self) -> None:
+        self._items: SimpleQueue[Any] = SimpleQueue()
+        self._idle = Semaphore(0)
+
+    def get(self) -> Any:
+        """As that of a queue."""
+        self._idle.release()
+        return self._items.get()
+
+    def put(self, item: Any) -> None:
+        """As that of a queue; None is the last item, after which the reader asks for no other."""
+        self._idle.acquire()
+        self._items.put(item)
+        if item is not None:
+            self._idle.acquire()
+            self._idle.release()
+
+    def qsize(self) -> int:
+        """As that of a queue."""
+        return self._items.qsize()
+
+
 def take_turns(turns: Turns) -> None:
     """Make ``outrider fly`` read and wait for no other clock."""
 
@@ -47,6 +79,7 @@ def take_turns(turns: Turns) -> None:
 
     def beside() -> tuple[Channel, OrderLink]:
         desk, orders = intercom()
+        assert hasattr(orders, "_clock")
         orders._clock = turns.seconds
         return desk, orders
 
@@ -59,6 +92,7 @@ def take_turns(turns: Turns) -> None:
     patches: dict[Any, dict[str, Any]] = {
         clocks: {"WallClock": lambda: turns},
         command: {"WallClock": lambda: turns, "time": shown},
+        event_log: {"SimpleQueue": _Written},
         flight: {"time": shown, "wait": waited, "ChildProcess": Child, "intercom": beside},
     }
     for module, names in patches.items():

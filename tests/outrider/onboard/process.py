@@ -1,4 +1,4 @@
-"""A process of ``outrider fly``, a target that circles, and what is seen of them."""
+"""A process of ``outrider fly`` that takes turns with a vehicle and a target, and what is seen of it."""
 
 from __future__ import annotations
 
@@ -8,68 +8,52 @@ import signal
 import socket
 import subprocess
 import sys
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
-from mavlink_bridge.frames import FleetFrame
-from mavlink_bridge.links.link import Link
-from outrider.simulation.beacon import Beacon
-from outrider.simulation.paths import Motion
+from tests.outrider.onboard.far_ends import Vehicle
+from tests.outrider.onboard.turns import Conductor
 
 HOST: Final = "127.0.0.1"
 PATIENCE: Final = 60.0
 """s until a test gives up; what is waited for comes within seconds."""
-FLEET: Final = FleetFrame(47.397742, 8.545594, 488.0)
-ORBIT, TURN = 8.0, 0.1
-"""m and rad/s of the target's circle."""
+ROUNDS = 100_000
+"""Number of rests, each of 1 ms of wall time at least, in which a process ends that has closed its socket."""
 GUIDED: Final = {"ardupilot": 4, "px4": 6 << 16}
 HELD: Final = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
 
 
-class Target:
-    """Circles, and says so five times a second of a time ``speed`` times as fast as the ``clock``."""
+class Flying:
+    """A running ``outrider fly`` in ``directory``, by the clock of a ``conductor``, beside a ``vehicle``.
 
-    def __init__(self, link: Link, speed: float, clock: Callable[[], float]) -> None:
-        self._link, self._speed, self._clock = link, speed, clock
-        self._beacon = Beacon(100, "target", 5.0, FLEET)
-        self._began = clock()
-
-    def pump(self) -> None:
-        """Say what is due."""
-        t = (self._clock() - self._began) * self._speed
-        if self._beacon.due(round(t * 1e6)):
-            place = ORBIT * np.array([np.sin(TURN * t), np.cos(TURN * t) - 1.0, 0.0])
-            velocity = ORBIT * TURN * np.array([np.cos(TURN * t), -np.sin(TURN * t), 0.0])
-            for datagram in self._beacon.say(round(t * 1e6), Motion(place, velocity)):
-                self._link.send(datagram.data)
-
-
-class Flying(ABC):
-    """A running ``outrider fly`` in ``directory``; ``program``: what runs it."""
+    ``program``: module that runs it, with the number of its socket to the conductor as first argument.
+    ``pump``: what else is called at each step of the vehicle.
+    """
 
     def __init__(
         self,
         directory: Path,
+        conductor: Conductor,
+        vehicle: Vehicle,
         *options: str,
-        program: Sequence[str] = ("outrider",),
-        hands: Sequence[int] = (),
+        program: str = "tests.outrider.onboard.in_turns",
     ) -> None:
+        self._conductor, self._vehicle, self._rounds = conductor, vehicle, 0
         self.directory = directory / "run"
-        command = [sys.executable, "-m", *program, "fly", "--json", f"--out={self.directory}", *options]
-        self.process = subprocess.Popen(
-            command,
-            pass_fds=hands,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
         self.pump: list[Callable[[], None]] = []
+        with conductor.admit() as end:
+            words = (str(end.fileno()), "fly", "--json", f"--out={self.directory}", *options)
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", program, *words],
+                pass_fds=[end.fileno()],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                start_new_session=True,
+            )
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -84,20 +68,43 @@ class Flying(ABC):
         ]
 
     def until(self, is_so: Callable[[], object]) -> None:
-        """Wait, and let the target speak meanwhile."""
+        """Let vehicle, target and process go on until ``is_so``, for PATIENCE (s) of the clock at most."""
         end = self.now() + PATIENCE
         while not is_so():
             assert self.now() < end, self.events
             assert self.process.poll() is None, self.process.communicate()
             self.rest()
 
-    @abstractmethod
     def now(self) -> float:
-        """s, of the clock by which this waits."""
+        """Return the time of the clock, s."""
+        return self._conductor.now * 1e-6
 
-    @abstractmethod
     def rest(self) -> None:
-        """A moment, in which the target speaks."""
+        """Let the processes go on to the vehicle's next step, make this step, and let the target send.
+
+        Without a process that has its socket the clock stands still: the process is about to end. It has
+        ``ROUNDS`` calls of this method for it.
+        """
+        conductor, vehicle = self._conductor, self._vehicle
+        if conductor.alone:
+            self._rounds += 1
+            assert self._rounds <= ROUNDS, f"the process closed its socket and goes on: {self.events}"
+            time.sleep(0.001)
+            return
+        while conductor.now < vehicle.due and not conductor.alone:
+            conductor.advance(vehicle.due)
+        vehicle.step()
+        for pump in self.pump:
+            pump()
+
+    def until_vehicle(self, is_so: Callable[[], object], beats: int) -> None:
+        """Go on until ``is_so``, whether the process has ended or not, for ``beats`` HEARTBEATs at most."""
+        most = len(self._vehicle.beats) + beats
+        while not is_so():
+            assert len(self._vehicle.beats) < most
+            while self._conductor.now < self._vehicle.due:
+                self._conductor.advance(self._vehicle.due)
+            self._vehicle.step()
 
     def sees(self, what: str, text: str) -> None:
         """Wait for an event."""
@@ -116,7 +123,7 @@ class Flying(ABC):
 
     @property
     def pilot(self) -> int:
-        """The process that flies."""
+        """Number of the process that flies."""
         last = [event["text"] for event in self.events if event["what"] == "process"][-1]
         return int(last.rpartition(" ")[2])
 
@@ -137,7 +144,7 @@ class Flying(ABC):
 
 
 def is_gone(process: int) -> bool:
-    """Whether there is no such process any more."""
+    """Return whether there is no such process any more."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -146,7 +153,7 @@ def is_gone(process: int) -> bool:
 
 
 def free_port() -> int:
-    """Of UDP."""
+    """Return the number of a free port of UDP."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind((HOST, 0))
         return int(probe.getsockname()[1])
