@@ -56,7 +56,7 @@ def test_a_shipped_comparison_can_be_flown(name: str) -> None:
     comparison = load(path, Comparison)
     found = cells_of(comparison, path, comparison.rows, None)
     assert len({cell.key for cell in found}) == len(comparison.rows)
-    assert comparison.differences
+    assert comparison.unlike
     assert all(one.source for one in comparison.published)
 
 

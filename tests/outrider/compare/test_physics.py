@@ -13,7 +13,8 @@ from outrider.compare.command import compare
 from outrider.compare.comparison import Comparison, Physics, Row
 from outrider.compare.flying import fly
 from outrider.compare.physics import in_physics
-from outrider.compare.scene import Scene, scenario_of
+from outrider.compare.scene import Scene, document_of, scenario_of
+from outrider.compare.world import Forest
 from outrider.compare.worlds import drawn
 from outrider.errors import InputError
 from outrider.resources import find
@@ -83,12 +84,22 @@ def test_a_scene_that_is_too_narrow_is_refused_with_the_reason(tmp_path: Path) -
     assert not (tmp_path / "out").exists()
 
 
-def test_a_row_that_is_too_narrow_is_left_out_unless_it_is_asked_for() -> None:
+def test_a_row_is_checked_only_if_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     comparison, path = loaded("maze-sparse")
     found = in_physics(comparison, path)
     near = {"starts.at": [[-1, 2, 1], [-1, 2.5, 1]], "starts.goals": [[7, 2, 1], [7, 4, 1]], "vehicles": 2}
     rows = (*found.rows, Row(label="near", set=near))
-    assert [cell.label for cell in cells_of(found, path, rows, None, needed=())] == [found.rows[0].label]
+    checked: list[Scene] = []
+    monkeypatch.setattr(
+        "outrider.compare.cells.document_of",
+        lambda scene, seed: checked.append(scene) or document_of(scene, seed),
+    )
+    keys = {cell.label: cell.key for cell in cells_of(found, path, rows, None, needed=())}
+    assert not checked
+    assert keys.keys() == {row.label for row in rows}
+    first = cells_of(found, path, rows, None, needed=(rows[0].label,))
+    assert {cell.label: cell.key for cell in first} == keys
+    assert len(checked) == 1
     with pytest.raises(InputError, match=r"0\.50 m from each other; allowed: at least the 0\.63 m"):
         cells_of(found, path, rows, None, needed=("near",))
 
@@ -105,6 +116,56 @@ def test_the_table_marks_it_and_counts_by_the_vehicles_distance(
     text = (tmp_path / "compare.md").read_text(encoding="utf-8")
     assert "outrider (firefly, full physics)" in text
     assert "0.63 m from tip to tip" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "kept", "dropped", "new"),
+    [
+        ("rmader", ["0.25 s one after another", "a plane 2 m above"], ["points whose"], ["v 5 m/s"]),
+        (
+            "maze-sparse",
+            ["they are not their mazes"],
+            ["Ours are points", "no such"],
+            ["1 m apart", "way.lanes"],
+        ),
+        ("hdsm-circle", ["know all cylinders at first"], ["points whose", "20 of 40"], ["v 5 m/s"]),
+    ],
+)
+def test_what_is_not_alike_stays_but_what_is_of_points(
+    name: str, kept: list[str], dropped: list[str], new: list[str]
+) -> None:
+    comparison, path = loaded(name)
+    before, after = ("\n".join(one.unlike) for one in (comparison, in_physics(comparison, path)))
+    assert set(comparison.differences) <= set(in_physics(comparison, path).unlike)
+    assert all(text in before and text in after for text in kept)
+    assert all(text in before and text not in after for text in dropped)
+    assert all(text in after and text not in before for text in ("In full physics", *new))
+
+
+@pytest.mark.parametrize("name", ["lsc-forest", "lsc-empty"])
+def test_a_row_keeps_distances_by_its_own_values(name: str) -> None:
+    comparison, path = loaded(name)
+    usual, wide = comparison.rows[0], {"companion.certified.tube": 0.3, "companion.certified.drift": 0.3}
+    other = usual.model_copy(update={"label": "wide", "set": {**usual.set, **wide}})
+    rows = in_physics(comparison.model_copy(update={"rows": (usual, other)}), path).rows
+    if comparison.missions is not None:
+        assert rows[0].missions is not None
+        assert rows[1].missions is not None
+        assert rows[1].missions.apart == pytest.approx(rows[0].missions.apart + 0.4)
+    else:
+        assert isinstance(rows[0].world, Forest)
+        assert isinstance(rows[1].world, Forest)
+        assert rows[1].world.passable == pytest.approx(rows[0].world.passable + 0.2)
+
+
+def test_what_the_vehicle_decides_is_not_for_rows_and_world_files_are_not_checked(tmp_path: Path) -> None:
+    comparison, path = loaded("rmader")
+    row = Row(label="near", set={"d_min": 0.3})
+    with pytest.raises(InputError, match="the row 'near' sets d_min, which the vehicle decides"):
+        in_physics(comparison.model_copy(update={"rows": (row,), "published": ()}), path)
+    with pytest.raises(InputError, match="--physics does not go with --worlds"):
+        compare("maze-sparse", physics=True, worlds=tmp_path, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

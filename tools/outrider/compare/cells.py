@@ -13,11 +13,13 @@ from outrider.compare.missions import folder_of
 from outrider.compare.scene import Places, Scene, document_of
 from outrider.compare.worlds import folder_of as folder_of_worlds
 from outrider.errors import InputError
+from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
 from outrider.simulation.preparation import prepared
 from outrider.sweep.cells import Cell
 from outrider.sweep.grid import overlay
 from outrider.yaml_files.yaml_file import load, read
+from sitl.vehicle.config import VehicleConfig
 
 _KEY_LENGTH = 20
 
@@ -33,8 +35,8 @@ def cells_of(
     """Return the cell of each of ``rows``, checked with the first seed; ``where`` is the comparison's file.
 
     ``folder``: mission files in place of drawn ones; ``worlds``: a folder of world files in place of drawn
-    worlds. A row that cannot be flown is left out unless its label is ``needed``, as by default all are.
-    Raises InputError before anything is flown.
+    worlds. ``needed``: labels of the rows that are checked; by default all are. Raises InputError for one
+    that cannot be flown.
     """
     if folder is not None and comparison.missions is None:
         raise InputError(f"--missions {folder}: {comparison.name} has one mission; allowed: no --missions")
@@ -61,15 +63,11 @@ def cells_of(
             given=tuple((_places(one.starts), _places(one.goals)) for one in given),
         )
         place = f"{where}: {row.label}"
-        try:
+        if needed is None or row.label in needed:
             # Read like a file, for the same messages.
-            scenario = read(json.dumps(document_of(scene, 1)).encode(), place, Scenario)
-            ready = prepared(scenario, place)
-        except InputError:
-            if needed is None or row.label in needed:
-                raise
-            continue
-        document, vehicle = scene.model_dump_json(), ready.vehicle.model_dump_json()
+            prepared(read(json.dumps(document_of(scene, 1)).encode(), place, Scenario), place)
+        document = scene.model_dump_json()
+        vehicle = load(find("vehicles", str(changed["vehicle"])), VehicleConfig).model_dump_json()
         key = hashlib.sha256(json.dumps([document, vehicle]).encode()).hexdigest()[:_KEY_LENGTH]
         found.append(
             Cell(row.label, f"{number:03d}-{comparison.name}", key, document, vehicle, is_scene=False)

@@ -53,13 +53,18 @@ def compare(
     """
     path = find("comparisons", name)
     comparison = load(path, Comparison)
+    if physics and worlds is not None:
+        raise InputError(
+            "--physics does not go with --worlds: whether the vehicle has a way through a world of a file is"
+            " not checked; allowed: one of them, with --physics drawn worlds"
+        )
     if physics:
         comparison = in_physics(comparison, path)
     chosen = _chosen(comparison, rows)
     # The journal is that of all rows, so that some of them are flown first, and others later. A folder of
     # missions or worlds may have those of the chosen rows alone.
     rows_of = comparison.rows if missions is None and worlds is None else chosen
-    # In full physics some rows may be too narrow: they are left out unless they are asked for.
+    # In full physics some rows may be too narrow: those that are not asked for are not checked.
     needed = {row.label for row in chosen} if physics else None
     every = cells_of(comparison, path, rows_of, missions, worlds, needed)
     cells = {cell.label: cell for cell in every}
@@ -69,8 +74,7 @@ def compare(
     entries = flown(header(title, every), [cells[row.label] for row in chosen], numbers, folder, run, jobs)
     if entries is None:
         return INTERRUPTED
-    possible = [row for row in rows_of if row.label in cells]
-    shown = [row for row in possible if row in chosen or _is_flown(cells[row.label], entries, numbers)]
+    shown = [row for row in rows_of if row in chosen or _is_flown(cells[row.label], entries, numbers)]
     found = [cells[row.label] for row in shown]
     results = [
         _result(comparison, row, cell, entries, numbers) for row, cell in zip(shown, found, strict=True)
@@ -84,7 +88,7 @@ def compare(
         "published": [
             one.model_dump() for one in comparison.published if one.row in {row.label for row in shown}
         ],
-        "differences": list(comparison.differences),
+        "differences": list(comparison.unlike),
     }
     whole_file.write(folder / DOCUMENT, json.dumps(document, indent=2) + "\n")
     whole_file.write(folder / MARKDOWN, table.markdown(comparison, results))

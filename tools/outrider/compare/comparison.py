@@ -105,6 +105,9 @@ class Physics(Part):
     set: dict[Key, JsonValue] = Field(
         {}, description="values of the scenario by dotted key, such as its limits and its tube"
     )
+    differences: tuple[Text, ...] = Field(
+        (), max_length=50, description="what is not alike only with this vehicle, a sentence each"
+    )
 
 
 class Comparison(Part):
@@ -126,7 +129,17 @@ class Comparison(Part):
     rows: tuple[Row, ...] = Field(min_length=1, max_length=100)
     physics: Physics | None = Field(None, description="the scene in full physics; null: for points only")
     published: tuple[Published, ...] = Field((), max_length=500)
-    differences: tuple[Text, ...] = Field((), max_length=50, description="what is not alike, a sentence each")
+    differences: tuple[Text, ...] = Field(
+        (), max_length=50, description="what is not alike, with points and in full physics, a sentence each"
+    )
+    points: tuple[Text, ...] = Field(
+        (), max_length=50, description="what else is not alike with points, a sentence each"
+    )
+
+    @property
+    def unlike(self) -> tuple[str, ...]:
+        """What is not alike in the scene that is flown, a sentence each."""
+        return (*self.points, *self.differences)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

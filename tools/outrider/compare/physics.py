@@ -22,8 +22,10 @@ def in_physics(comparison: Comparison, where: Path) -> Comparison:
     """Return ``comparison``, of the file ``where``, with the vehicle of its part ``physics``.
 
     Two vehicles keep the vehicle's span, centres half of it from obstacles. Drawn starts are as far apart as
-    its plans, and drawn worlds have ways for it. There are no bars, which are for points. Raises InputError
-    without such a part, and where the scene is too narrow for the vehicle.
+    its plans, and drawn worlds have ways for it, in each row with the row's own values. There are no bars,
+    which are for points. What is not alike for points only is replaced by the part's own differences. Raises
+    InputError without such a part, for a row that sets the vehicle or a distance of its own, and where the
+    scene is too narrow for the vehicle.
     """
     if comparison.physics is None:
         raise InputError(
@@ -38,7 +40,8 @@ def in_physics(comparison: Comparison, where: Path) -> Comparison:
         "companion.certified.d_min_obstacle": span / 2.0,
     }
     values = {**comparison.set, **comparison.physics.set, **own}
-    apart, clear = _kept(comparison, where, values)
+    base = load(where.parent / comparison.scenario, Scenario).model_dump(mode="json")
+    apart, clear = _kept(base, where, values)
     measure = comparison.measure
     found = Measure(
         kind="ball" if measure.kind == "box" else measure.kind,
@@ -46,25 +49,28 @@ def in_physics(comparison: Comparison, where: Path) -> Comparison:
         downwash=measure.downwash,
         obstacle=None if measure.obstacle is None else span / 2.0,
     )
-    rows = tuple(
-        row.model_copy(
-            update={
-                "bar": None,
-                "missions": _farther(row.missions, apart),
-                "world": _passable(row.world, clear, name),
-            }
-        )
-        for row in comparison.rows
-    )
+    rows = []
+    for row in comparison.rows:
+        if taken := sorted(own.keys() & row.set.keys()):
+            raise InputError(
+                f"--physics: the row {row.label!r} sets {taken[0]}, which the vehicle decides; allowed: a"
+                " row without it"
+            )
+        apart_here, clear_here = _kept(base, where, {**values, **row.set}) if row.set else (apart, clear)
+        missions = _farther(row.missions or comparison.missions, apart_here)
+        world = _passable(row.world or comparison.world, clear_here, name)
+        rows.append(row.model_copy(update={"bar": None, "missions": missions, "world": world}))
+    note = _note(name, span, apart, clear, measure.obstacle is not None)
     return comparison.model_copy(
         update={
             "name": f"{comparison.name}-physics",
             "measure": found,
             "set": values,
-            "rows": rows,
+            "rows": tuple(rows),
             "missions": _farther(comparison.missions, apart),
             "world": _passable(comparison.world, clear, name),
-            "differences": (_note(name, span, apart, clear, measure.obstacle is not None),),
+            "points": (),
+            "differences": (note, *comparison.physics.differences, *comparison.differences),
         }
     )
 
@@ -77,9 +83,8 @@ def _vehicle(name: str) -> VehicleConfig:
     return found
 
 
-def _kept(comparison: Comparison, where: Path, values: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the least distances (m) of two plans, and of a plan from surfaces."""
-    base = load(where.parent / comparison.scenario, Scenario).model_dump(mode="json")
+def _kept(base: Mapping[str, Any], where: Path, values: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the least distances (m) of two plans, and of a plan from surfaces, with ``values`` set."""
     document = json.dumps(overlay(base, values)).encode()
     config = read(document, f"{where}: physics", Scenario).companion
     terms = config.certified, config.field, config.limits

@@ -62,7 +62,7 @@ def markdown(comparison: Comparison, results: Sequence[Result]) -> str:
     rows = [" | ".join(_HEADS), " | ".join("---" for _ in _HEADS)]
     rows += [" | ".join(words) for result in results for words in lines(comparison, result)]
     sources = dict.fromkeys(f"{one.planner}: {one.source}" for one in comparison.published)
-    notes = [*(f"- {text}" for text in comparison.differences), *(f"- {text}" for text in sources)]
+    notes = [*(f"- {text}" for text in comparison.unlike), *(f"- {text}" for text in sources)]
     return (
         "".join(f"| {line} |\n" for line in rows)
         + "\n"

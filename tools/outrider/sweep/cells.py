@@ -81,7 +81,7 @@ def waits_for_others(cell: Cell) -> bool:
     """Return whether the runs of ``cell`` wait only for vehicles whose companion does not end for good."""
     document = json.loads(cell.document)
     values = document["scenario"] if cell.is_scene else document
-    return values.get("arrival") == "others"
+    return bool(values.get("arrival") == "others")
 
 
 def scenario_of(task: Task) -> Scenario:

@@ -20,9 +20,7 @@ class ResultCounter:
     ``others``: keys of the cells with ``arrival: others``.
     """
 
-    def __init__(
-        self, total: int, finished: int, bar: Progress | None, others: Collection[str] = ()
-    ) -> None:
+    def __init__(self, total: int, finished: int, bar: Progress | None, others: Collection[str] = ()) -> None:
         self._others = others
         self._total, self._before, self._left = total, finished, total - finished
         self._bar = bar
