@@ -190,10 +190,11 @@ def test_who_does_not_converge_is_flown_to_the_cap() -> None:
     assert run.conductor.clock_end == run.conductor.clock_start + 10_000_000
 
 
-@pytest.mark.parametrize(("ends_at", "lasts"), [(1.0, 7.0), (3.0, 9.0)])
+@pytest.mark.parametrize(("ends_at", "lasts"), [(1.0, 7.0), (3.0, 9.0), (29.0, 35.0), (100.0, 30.0)])
 def test_the_arrival_of_the_others_ends_a_flight_but_not_before_the_last_companion_has_ended(
     ends_at: float, lasts: float
 ) -> None:
+    """An end after the time limit of 30 s does not count: the limit ends the flight."""
     faults = [{"kind": "vanish", "vehicle": 12, "at_s": ends_at}]
     changes = {"vehicles": 2, "airborne": True, "cap_s": 30.0, "faults": faults}
     run = Run(scenario("antipodal-8", **changes, arrival="others"))

@@ -267,7 +267,7 @@ class Conductor:
             able = goals.lasting & ~goals.covered
             self._able.see(now, arrived=bool(able.any() and arrived[able].all()))
         over = since >= self._scenario.duration_s * 1e6
-        arrived_at = self._arrived_at(now - since)
+        arrived_at = self._arrived_at(now - since, since)
         if arrived_at is not None:
             over = now >= arrived_at + HOLD + _TIME_AFTER_CONVERGENCE_US
         if over:
@@ -277,16 +277,19 @@ class Conductor:
             else:
                 self._land(now)
 
-    def _arrived_at(self, start: int) -> int | None:
-        """Return since when (µs) all have arrived whose arrival ends the flight; ``start`` (µs): the clock's.
+    def _arrived_at(self, start: int, since: int) -> int | None:
+        """Return the time (µs) of the arrival that ends the flight; None while it has not come.
 
-        Those of ``others`` have not before the last companion has ended for good: the flight shows the
-        result of that, too.
+        ``start`` (µs): beginning of the clock; ``since`` (µs): its reading. With ``arrival: others`` this
+        arrival does not come before the last companion has ended for good, so that the flight shows the
+        result of that, too. If that end is later than the time limit, the limit ends the flight.
         """
         if self.converged_at is not None or self._scenario.arrival == "all":
             return self.converged_at
         others = self.others_converged_at
-        return None if others is None else max(others, start + self._last_end)
+        if others is None or since < self._last_end:
+            return None
+        return max(others, start + self._last_end)
 
     def _land(self, now: int) -> None:
         self.stage, self._land_at = Stage.LAND, now
