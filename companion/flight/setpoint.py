@@ -43,16 +43,16 @@ def setpoint(
     It contains the state of ``horizon`` at ``time`` (µs), and ``yaw``. ``since_boot`` (µs): time_boot_ms;
     ``own`` is the sender, and its system id the target's; ``mask`` is POSITION_TARGET_TYPEMASK.
     ``compensation`` (3,), m/s², fleet-local ENU, is added to the acceleration. ``bias`` (3,), m/s, is added
-    to the velocity (see ``tracking.py``); the sum is then clipped on each axis to the least and largest
-    velocity of ``velocities`` (2, 3), and not below the planned speed; then ``added`` (3,), m/s, is added
-    (see ``plan_feedforward.py``). The acceleration is that of the horizon ``lead`` µs later.
+    to the velocity (see ``tracking.py``); the sum is then clipped on each axis to the interval from the least
+    to the largest velocity of ``velocities`` (2, 3), extended to the planned velocity where that is outside;
+    then ``added`` (3,), m/s, is added (see ``plan_feedforward.py``). The acceleration is that of the horizon
+    ``lead`` µs later.
     """
     motion = horizon.at(time)
     acceleration = horizon.at(time + lead).acceleration if lead else motion.acceleration
     velocity = motion.velocity
     if bias is not NO_ACCELERATION:
-        planned = np.abs(velocity)
-        least, most = np.minimum(-planned, velocities[0]), np.maximum(planned, velocities[1])
+        least, most = np.minimum(velocity, velocities[0]), np.maximum(velocity, velocities[1])
         velocity = np.minimum(np.maximum(velocity + bias, least), most)
     if added is not NO_ACCELERATION:
         velocity = velocity + added

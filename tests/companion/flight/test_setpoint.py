@@ -82,15 +82,48 @@ def test_the_receiver_reads_the_horizon_at_that_time_whatever_its_origin(x, v, a
     assert -math.pi - 1e-6 <= wired.yaw <= math.pi + 1e-6
 
 
-@given(v=vectors(8.0), bias=vectors(4.0))
-def test_a_corrected_velocity_stays_within_least_and_largest_values(v, bias):
-    """Or within the planned speed where that is more."""
-    velocities = np.array([[-1.0, -3.0, -0.5], [2.0, 1.0, 2.0]])
+def corrected(v, bias, velocities):
+    """The velocity that is sent, in the fleet's frame, of a plan with velocity ``v``."""
     horizon = roll_out(EPOCH, 100_000, ZERO, v, np.zeros((16, 3)))
     message = setpoint(EPOCH, 0, horizon, LEVEL, HOME, OWN, 0, bias=bias, velocities=velocities)
-    found = HOME.velocity_to_fleet(message.velocity)
-    low, high = np.minimum(velocities[0], -np.abs(v)), np.maximum(velocities[1], np.abs(v))
-    np.testing.assert_allclose(found, np.clip(v + bias, low, high), atol=1e-9)
+    return np.array(HOME.velocity_to_fleet(message.velocity))
+
+
+@given(v=vectors(8.0), bias=vectors(4.0))
+def test_a_correction_passes_no_limit_and_is_sent_whole_where_it_meets_none(v, bias):
+    """On each axis. Where the plan itself is beyond a limit, a correction goes no further beyond it."""
+    least, most = velocities = np.array([[-1.0, -3.0, -0.5], [2.0, 1.0, 2.0]])
+    found, wanted = corrected(v, bias, velocities), v + bias
+    for axis in range(3):
+        got, plan = found[axis], v[axis]
+        if least[axis] <= wanted[axis] <= most[axis]:
+            assert got == pytest.approx(wanted[axis], abs=1e-9)
+        elif least[axis] <= plan <= most[axis]:
+            limit = least[axis] if wanted[axis] < least[axis] else most[axis]
+            assert got == pytest.approx(limit, abs=1e-9)
+        else:
+            assert got >= min(least[axis], plan) - 1e-9
+            assert got <= max(most[axis], plan) + 1e-9
+
+
+def test_a_planned_climb_does_not_lower_the_bound_of_descent():
+    velocities = np.array([[-1.0, -1.0, -0.5], [1.0, 1.0, 2.0]])
+    found = corrected(np.array([0.0, 0.0, 0.7]), np.array([0.0, 0.0, -1.5]), velocities)
+    assert found[2] == pytest.approx(-0.5, abs=1e-9)
+
+
+@given(v=vectors(8.0), bias=vectors(4.0))
+def test_the_bound_of_one_direction_does_not_depend_on_a_plan_in_the_other(v, bias):
+    """With equal limits both ways this differs from a bound on the speed only where |v| exceeds the limit."""
+    limits = np.array([3.0, 2.0, 1.0])
+    found = corrected(v, bias, np.stack([-limits, limits]))
+    most = np.maximum(np.abs(v), limits)
+    by_speed = np.clip(v + bias, -most, most)
+    within = np.abs(v) <= limits
+    np.testing.assert_allclose(found[within], by_speed[within], atol=1e-9)
+    # A plan beyond a limit does not move the opposite one.
+    assert (found[v > limits] >= -limits[v > limits] - 1e-9).all()
+    assert (found[v < -limits] <= limits[v < -limits] + 1e-9).all()
 
 
 def test_it_is_addressed_to_the_own_autopilot():
