@@ -131,10 +131,10 @@ def _changes_of_least(
     """Yield of each least value: name, unit, what it was and is now, and the responsible field."""
     if before.u_min is not None and after.u_min is not None:
         yield "u_min", "m/s²", min(before.u_min[:2]), min(after.u_min[:2]), push
-        yield "u_min up", "m/s²", before.u_min[2], after.u_min[2], "tilt"
+        yield "u_min vertical", "m/s²", before.u_min[2], after.u_min[2], "tilt"
     if before.v_min is not None and after.v_min is not None:
         yield "v_min", "m/s", min(before.v_min[:2]), min(after.v_min[:2]), "speed"
-        yield "v_min up", "m/s", before.v_min[2], after.v_min[2], "sink"
+        yield "v_min vertical", "m/s", before.v_min[2], after.v_min[2], "sink"
 
 
 def _lacking(able: Limits, autopilot: int, parameters: Mapping[str, float]) -> Iterator[str]:

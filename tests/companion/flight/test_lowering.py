@@ -129,8 +129,8 @@ def test_climb_and_descent_are_lowered_apart_where_both_are_stated():
     found = lowered(asked, ARDUPILOT, parameters)
     assert (found.limits.v_max[2], found.limits.v_min[2]) == (min(SHIPPED.v_max[2], 1.5), -0.8)
     assert found.limits.u_min[2] == -found.limits.a_total
-    assert "v_min up -0.8 m/s (WPNAV_SPEED_DN 80)" in found.changes
-    assert "u_min up -3.21 m/s² (ANGLE_MAX 2000)" in found.changes
+    assert "v_min vertical -0.8 m/s (WPNAV_SPEED_DN 80)" in found.changes
+    assert "u_min vertical -3.21 m/s² (ANGLE_MAX 2000)" in found.changes
 
 
 def test_jerk_that_is_not_bounded_is_bounded_where_the_firmware_does():
