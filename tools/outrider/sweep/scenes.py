@@ -28,6 +28,7 @@ DECIDED = (
     "obstacles",
     "companion.task",
     "companion.limits.v_max",
+    "companion.limits.v_min",
     "companion.surface.radius",
 )
 """Dotted keys of a scenario that a scene decides."""
