@@ -72,11 +72,6 @@ class Statement(NamedTuple):
     away: bool = False
     outside: float = 0.0
 
-    def __hash__(self) -> int:
-        """Return a hash of what tells most statements apart; that of all entries takes ten times as long."""
-        first = self.entries[0].peer if self.entries else 0
-        return hash((self.fingerprint, self.epoch, len(self.entries), first))
-
 
 def pack(statement: Statement) -> bytes:
     """Encode ``statement``; raise PlanWireError for a value that does not fit, and for too many entries."""

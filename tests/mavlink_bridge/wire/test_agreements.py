@@ -83,6 +83,21 @@ def test_in_several_messages_every_entry_is_stated_once_and_in_its_order(stateme
         assert len(pack(part)) + size(after.entries[0]) > LARGEST
 
 
+@given(entries(), st.integers(0, 8))
+def test_a_message_takes_exactly_as_many_entries_as_its_bytes_have_room_for(entry: Entry, many: int) -> None:
+    """So the length by which entries are divided is that of their bytes, for any entry."""
+    alone = len(pack(Statement(0, 0, 0, (entry,)))) - HEADER
+    room = (LARGEST - HEADER) // alone
+    parts = in_messages(Statement(0, 0, 0, (entry,) * many))
+    full, rest = divmod(many, room)
+    assert [len(part.entries) for part in parts if part.entries] == [room] * full + [rest] * (rest > 0)
+    # Entries of 16 bytes beside it fill what is left, and one more does not fit.
+    small = Entry(1)
+    beside = (LARGEST - HEADER - alone) // 16
+    assert len(in_messages(Statement(0, 0, 0, (entry, *(small,) * beside)))) == 1
+    assert len(in_messages(Statement(0, 0, 0, (entry, *(small,) * (beside + 1))))) == 2
+
+
 def test_seven_peers_with_an_agreement_each_need_one_message() -> None:
     of = [Entry(peer, ((2**50, 2**50),), (2**50, 2**50)) for peer in range(1, 7)]
     assert len(in_messages(Statement(7, 2**50, 2**49, tuple(of)))) == 1
