@@ -41,14 +41,17 @@ Bounds = Annotated[
 """Bounds of the three axes, east, north and up; one number is that of each."""
 
 
-Floor = Annotated[float, Field(ge=-100.0, lt=0.0)]
+Floor = Annotated[float, Field(ge=-100.0, le=-0.1)]
 
 
 Floors = Annotated[
     tuple[Floor, Floor, Floor],
     BeforeValidator(_of_each_axis, json_schema_input_type=Floor | tuple[Floor, Floor, Floor]),
 ]
-"""Least values of the three axes, all below zero; one number is that of each."""
+"""Least values of the three axes, −0.1 at most; one number is that of each.
+
+Committed plans keep 0.01 m/s² from bounds of acceleration, for rounding: an axis needs more than that.
+"""
 
 
 class HorizonConfig(Settings):
@@ -84,9 +87,11 @@ class LimitsConfig(Settings):
     u_max: Bounds = Field(
         (2.0, 2.0, 2.0), description="m/s² an axis, of the input u without the field's force"
     )
-    u_min: Floors | None = Field(None, description="m/s² an axis, least value of the input u; null: -u_max")
+    u_min: Floors | None = Field(
+        None, description="m/s² an axis, least value of the input u, -0.1 at most; null: -u_max"
+    )
     v_max: Bounds = Field((5.0, 5.0, 5.0), description="m/s an axis")
-    v_min: Floors | None = Field(None, description="m/s an axis, least velocity; null: -v_max")
+    v_min: Floors | None = Field(None, description="m/s an axis, least velocity, -0.1 at most; null: -v_max")
     a_total: float = Field(7.0, gt=0.0, le=30.0, description="m/s²; the firefly at 35° of tilt has 6.9")
     j_max: Bounds | None = Field(
         None,

@@ -21,6 +21,11 @@ WRONG = {
     "less than u_max": ({"limits": {"u_max": (3.0, 2.0, 2.0), "a_total": 2.5}}, "a_total"),
     "less than -u_min": ({"limits": {"u_min": (-3.0, -2.0, -2.0), "a_total": 2.5}}, "a_total"),
     "a least velocity above zero": ({"limits": {"v_min": (-1.0, -1.0, 0.5)}}, "v_min"),
+    "a least input within the rounding of plans": (
+        {"limits": {"u_min": -0.005}},
+        "less than or equal to -0.1",
+    ),
+    "a least velocity of nearly zero": ({"limits": {"v_min": -0.05}}, "less than or equal to -0.1"),
     "a least input of zero": ({"limits": {"u_min": 0.0}}, "u_min"),
     "a force that the least input cancels": (
         {"limits": {"u_min": -6.5}, "methods": ("tangential",)},
