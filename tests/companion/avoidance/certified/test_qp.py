@@ -165,17 +165,6 @@ def test_equal_problems_have_equal_solutions_to_the_last_bit(seed: int, kind: Ca
     assert first.rounds == second.rounds
 
 
-@given(seeds, st.sampled_from([WIDE, NARROW, SMOOTH]))
-def test_the_same_bound_both_ways_is_no_other_problem_to_the_last_bit(
-    seed: int, limits: LimitsConfig
-) -> None:
-    mirrored = {"u_min": limits.least_u, "v_min": limits.least_v}
-    stated = LimitsConfig.model_validate({**limits.model_dump(), **mirrored})
-    one, other = (solved(scene(seed, each)) for each in (limits, stated))
-    assert one.accelerations.tobytes() == other.accelerations.tobytes()
-    assert one.forces.tobytes() == other.forces.tobytes()
-
-
 @given(seeds)
 def test_a_lopsided_problem_in_a_mirror_has_the_mirrored_plan(seed: int) -> None:
     """Least and largest values change places with their signs."""

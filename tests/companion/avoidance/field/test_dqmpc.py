@@ -221,18 +221,6 @@ def test_any_state_is_solved_within_least_and_largest_values(x, v, f, destinatio
 
 @LAWS
 @given(x=vectors(60.0), v=vectors(15.0), f=fields(), destination=vectors(60.0), scale=SCALES)
-def test_the_same_bound_both_ways_is_no_other_problem_to_the_last_bit(x, v, f, destination, scale):
-    stated = LimitsConfig(u_min=LimitsConfig().least_u, v_min=LimitsConfig().least_v)
-    other = Dqmpc(HorizonConfig(), CostConfig(), stated)
-    one, two = (
-        each.solve(each.problem(x, v, f, destination, ZERO, scale), scale) for each in (DEFAULT, other)
-    )
-    np.testing.assert_array_equal(one.acceleration, two.acceleration)
-    assert one.relaxed == two.relaxed
-
-
-@LAWS
-@given(x=vectors(60.0), v=vectors(15.0), f=fields(), destination=vectors(60.0), scale=SCALES)
 def test_least_and_largest_values_change_places_in_a_mirror(x, v, f, destination, scale):
     """Also where bounds are opened and limits widened: each side has its own bounds."""
     one, two = (Dqmpc(HorizonConfig(), CostConfig(), limits) for limits in (LOPSIDED, TURNED))
