@@ -24,6 +24,7 @@ from companion.avoidance.certified.committed import (
 )
 from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes, mean_velocities
 from companion.avoidance.certified.mended_rounding import mended
+from companion.avoidance.certified.plan_limits import PlanLimits
 from companion.avoidance.certified.qp import Answer, Objective, SeparationQp, State
 from companion.avoidance.certified.separating_planes import Others, kept, planes
 from companion.avoidance.certified.vicinity import region, within_region
@@ -66,6 +67,7 @@ class Commitment:
         self._deadlock_turn = deadlock_turn
         self._planar = planar
         self._rounding = rounding(program.n, config.dt_us)
+        self._limits = PlanLimits(program.n, config.dt_us, program.limits)
         self.announced_until = 0
         """Last epoch (µs) of which a plan was announced."""
         self.current: WirePlan | None = None
@@ -215,7 +217,8 @@ class Commitment:
             better, answer = mended(rounded[0], corridor), rounded[1]
             if better is not None:
                 points = controls(better)
-                if kept(corridor, points) and self._compact(own, points):
+                whole = kept(corridor, points) and self._compact(own, points)
+                if whole and self._limits.kept(start, own, better, points, state.before):
                     self._adopt(better, points, answer, objective, goal, others)
                     return True
         self.carry_on(reason)

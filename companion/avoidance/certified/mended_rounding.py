@@ -2,11 +2,16 @@
 
 A solution that lies on planes may break them once it is rounded. If there is room behind them, a solution
 that keeps them by the rounding error has none of this. Between a plane and a limit there may be none, as
-for a vehicle that brakes above the floor of its box below another one. Then the rounded plan is changed: one
-unit more of the acceleration before the control point that is furthest behind its plane, along the axis on
-which the plane faces most, and one unit less after it. So that point moves by half a unit times dt², all
-later ones by twice as much, and no velocity but the one between changes. Speeds and limits change no more
-than by rounding. The result must be checked like any rounded plan.
+for a vehicle that brakes above the floor of its box below another one. Then the rounded plan is changed.
+
+Each step of the change finds the control point that breaks its plane by the largest distance, and the axis
+along which this plane's normal is longest. Along this axis it changes two successive accelerations: the
+last one that moves this control point by one unit towards the plane's free side, and the next one by one
+unit back. So that point moves by half a unit times dt², or by a whole one where it is the second of its
+segment, and all later ones by a whole one. Only the velocity at the knot between the two accelerations
+changes. An acceleration changes by up to ``MOST_UNITS``, and a place by the sum of all steps, both more than
+by rounding: so the result must be checked for its limits (``plan_limits``), too, and for its planes and its
+length like any rounded plan.
 """
 
 from __future__ import annotations
@@ -18,7 +23,7 @@ from companion.avoidance.certified.separating_planes import Planes
 from mavlink_bridge.wire.plan import WirePlan
 
 MOST_UNITS = 8
-"""Largest change of an acceleration (mm/s²); plans keep their bounds with a little more (``qp``)."""
+"""Largest change of an acceleration (mm/s²); plans of the QP keep their bounds by 10 mm/s²."""
 _MOST_STEPS = 64
 _SPARE_M = 1e-12
 """Distance (m) beyond each plane that covers the rounding of this module's sums."""

@@ -63,8 +63,9 @@ class Negotiation:
     def advance(self, now: int, peer: Peer, newest: StoredPlan, since: int) -> None:
         """Take an offer of ``peer`` that the ``newest`` own plan keeps, or propose or refuse one.
 
-        Offers on own plans of before ``since`` (µs) are void. If there was nothing to do, and only something
-        new of the peer or of the own plan can change that, the peer is ``settled``.
+        Offers on own plans of before ``since`` (µs) are void. If nothing was taken, refused or acknowledged,
+        the peer is ``settled``: there is nothing to do until its next message, until the next own plan, or
+        until a proposal has waited too long for an answer.
         """
         pair, epoch = peer.pair, newest.plan.epoch
         before = pair.kept, pair.considered

@@ -110,6 +110,7 @@ class SeparationQp:
     ) -> None:
         n, dt = steps, config.dt_us * 1e-6
         self.n, self.dt = n, dt
+        self.limits = limits
         S_v, self._S_x, _ = prediction(n, dt)
         self._S_v = np.ascontiguousarray(S_v)
         v, x = (np.vstack([np.zeros((1, n)), part[:-1]]) for part in (self._S_v, self._S_x))
