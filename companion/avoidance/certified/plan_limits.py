@@ -28,22 +28,28 @@ class PlanLimits:
 
     def __init__(self, steps: int, dt_us: int, limits: LimitsConfig) -> None:
         self._dt = 1e-6 * dt_us
-        knots = np.arange(1, steps + 1)[:, None]
-        change: Array = np.full(3, np.inf) if limits.j_max is None else self._dt * np.array(limits.j_max)
-        of_changes = np.full((steps + 1, 1), 2.0 * _HALF_M_S2)
+        knots: Array = np.arange(1.0, steps + 1.0)[:, None]
+        of_changes: Array = np.full((steps + 1, 1), 2.0 * _HALF_M_S2)
         of_changes[0] = _HALF_M_S2
         of_changes[-2:] = [steps * _HALF_M_S2], [(steps - 1) * _HALF_M_S2]
-        before, after = (knots - 1) ** 2 + (knots - 1), knots**2
-        of_places = 0.5 * _HALF_M_S2 * self._dt**2 * np.stack([before, after], axis=1)
-        least_u, least_v, low = map(np.array, (limits.least_u, limits.least_v, limits.box_min))
-        most_u, most_v, high = map(np.array, (limits.u_max, limits.v_max, limits.box_max))
-        # Of accelerations, their changes, velocities, and places: least and largest value, and rounding.
-        self._limits: tuple[tuple[Array, Array, Array], ...] = (
-            (least_u, most_u, np.zeros(1)),
-            (-change, change, of_changes),
-            (least_v, most_v, _HALF_M_S2 * self._dt * knots),
-            (low, high, of_places),
+        half_way, after = (knots - 1) * knots, knots**2
+        of_places: Array = 0.5 * _HALF_M_S2 * self._dt**2 * np.stack([half_way, after], axis=1)
+        of_speeds: Array = _HALF_M_S2 * self._dt * knots
+        change: Array = np.full(3, np.inf) if limits.j_max is None else self._dt * np.array(limits.j_max)
+        # Of accelerations, their changes, velocities, and places.
+        self._least: tuple[Array, ...] = (
+            np.array(limits.least_u),
+            -change,
+            np.array(limits.least_v),
+            np.array(limits.box_min),
         )
+        self._most: tuple[Array, ...] = (
+            np.array(limits.u_max),
+            change,
+            np.array(limits.v_max),
+            np.array(limits.box_max),
+        )
+        self._by_rounding: tuple[Array, ...] = np.zeros(1), of_changes, of_speeds, of_places
 
     def kept(self, committed: WirePlan, own: Array, plan: WirePlan, points: Array, before: Array) -> bool:
         """Return whether ``plan`` passes no limit further than the ``committed`` one or than by rounding.
@@ -52,7 +58,8 @@ class PlanLimits:
         one state; ``before`` (3,), m/s²: the acceleration until then.
         """
         was, found = self._values(committed, own, before), self._values(plan, points, before)
-        for (least, most, rounding), old, new in zip(self._limits, was, found, strict=True):
+        bounds = zip(self._least, self._most, self._by_rounding, was, found, strict=True)
+        for least, most, rounding, old, new in bounds:
             room = rounding + _EXACT
             if (new < np.minimum(least, old) - room).any() or (new > np.maximum(most, old) + room).any():
                 return False
@@ -60,7 +67,8 @@ class PlanLimits:
 
     def _values(self, plan: WirePlan, points: Array, before: Array) -> tuple[Array, ...]:
         """Return accelerations, their changes from ``before`` to the rest, velocities, and control points."""
-        accelerations: Array = 1e-3 * accelerations_of(plan)
-        changes = np.diff(accelerations, axis=0, prepend=before[None], append=0.0)
-        velocities = plan.velocity_m_s + self._dt * np.cumsum(accelerations, axis=0)
+        accelerations: Array = 1e-3 * accelerations_of(plan).astype(np.float64)
+        changes: Array = np.diff(accelerations, axis=0, prepend=before[None], append=0.0)
+        summed: Array = np.cumsum(accelerations, axis=0)
+        velocities: Array = plan.velocity_m_s + self._dt * summed
         return accelerations, changes, velocities, points[:, 1:]
