@@ -19,7 +19,8 @@ from mavlink_bridge.clocks.clock import WallClock
 from mavlink_bridge.links.opening import open_link
 from mavlink_bridge.messages import GlobalPosition, Heartbeat, Message, SysStatus
 from mavlink_bridge.wire.codec import Codec
-from tests.outrider.onboard.process import FLEET, HOST
+from tests.outrider.onboard.far_ends import FLEET
+from tests.outrider.onboard.process import HOST
 from tests.outrider.sitl_server.test_command import free_base
 from tests.soak.switch import Switch
 

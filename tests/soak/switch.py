@@ -13,7 +13,8 @@ import numpy as np
 
 from outrider.simulation.beacon import Beacon
 from outrider.simulation.paths import Motion
-from tests.outrider.onboard.process import FLEET, HOST
+from tests.outrider.onboard.far_ends import FLEET
+from tests.outrider.onboard.process import HOST
 
 
 class Switch:
