@@ -24,8 +24,14 @@ def wrapped(angles: Array) -> Array:
     return result
 
 
-def turned(vector: Array, angle: float) -> Array:
-    """Return ``vector`` (3,) rotated about the vertical by ``angle`` (rad), counter-clockwise from above."""
+def rotated(vector: tuple[float, float, float], angle: float) -> tuple[float, float, float]:
+    """Return ``vector`` rotated about the vertical by ``angle`` (rad), counter-clockwise from above."""
     c, s = cos(angle), sin(angle)
+    x, y, z = vector
+    return c * x - s * y, s * x + c * y, z
+
+
+def turned(vector: Array, angle: float) -> Array:
+    """Return ``vector`` (3,) ``rotated`` by ``angle`` (rad)."""
     x, y, z = vector.tolist()
-    return np.array([c * x - s * y, s * x + c * y, z])
+    return np.array(rotated((x, y, z), angle))

@@ -17,13 +17,13 @@ that turned with them would pass them on the far side, with the goal on the near
 
 from __future__ import annotations
 
-from math import cos, pi, sin, sqrt
+from math import pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from companion.config.certified import DeadlockConfig
-from companion.values.bearings import turned
+from companion.values.bearings import rotated, turned
 from companion.values.compiled import FLOAT, VOID, array, kernel, output, several
 from companion.values.horizon import Array
 
@@ -119,12 +119,12 @@ class DeadlockTurn:
         least = max(direct, 1e-6)
         direction = x / least, y / least, z / least
         # Without a side no push is left out.
-        aside = (0.0, 0.0, 0.0) if moving else _turned(direction, -self._sense * 0.5 * pi)
+        aside = (0.0, 0.0, 0.0) if moving else rotated(direction, -self._sense * 0.5 * pi)
         push = _counted(*pushes, direction, aside, config.chase)
         push_back = -_dot(push, direction)
         if overtime > 0.0:
             # After ``patience`` without progress, a push back along the turned direction counts, too.
-            push_back = max(push_back, -_dot(push, _turned(direction, -self._sense * self.angle)))
+            push_back = max(push_back, -_dot(push, rotated(direction, -self._sense * self.angle)))
         pushed = min(max(push_back / (gradient_per_metre * max(direct, _MIN_PULL_DISTANCE_M)), 0.0), 1.0)
         pushed *= min(max(1.0 - approach_speed / config.speed, 0.0), 1.0)
         if pushed > config.pushed:
@@ -146,13 +146,6 @@ def mean_velocities(controls: Array, seconds: float, count: int) -> Array:
 
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _turned(vector: Vector, angle: float) -> Vector:
-    """Return ``vector`` rotated about the vertical by ``angle`` (rad), see ``turned``."""
-    c, s = cos(angle), sin(angle)
-    x, y, z = vector
-    return c * x - s * y, s * x + c * y, z
 
 
 @kernel(VOID, array(4), FLOAT, output(2))
