@@ -29,6 +29,7 @@ from companion.avoidance.certified.vicinity import Vicinity
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
+from companion.values.vectors import limit
 from companion.ways import way_of
 from companion.ways.subgoal import Subgoal
 from companion.world import View, World
@@ -369,7 +370,8 @@ class CertifiedFlight:
         if not self._in_lane:
             met = self._met(now, start, goal) if anticipates else NOBODY
             goal = self._deadlock_turn.turned(start.position_m, goal, met.angle)
-            goal = _no_further(start.position_m, goal, met.ahead)
+            if met.ahead < inf:
+                goal = start.position_m + limit(goal - start.position_m, met.ahead)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 
@@ -496,13 +498,3 @@ class CertifiedFlight:
             agreements.fingerprint, epoch, agreements.since, entries, farewell, outside=self._outside
         )
         return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(part)) for part in in_messages(statement)]
-
-
-def _no_further(position: Array, goal: Array, most: float) -> Array:
-    """Return the place (3,), m, in the direction of ``goal`` that is at most ``most`` (m) away."""
-    offset = goal - position
-    length = float(np.sqrt(offset @ offset))
-    if length <= most:
-        return goal
-    result: Array = position + offset * (most / length)
-    return result
