@@ -162,13 +162,17 @@ def test_any_state_and_field_is_solved_within_the_vehicles_limits(x, v, f, desti
     assert_within_u_max_of_the_field(DEFAULT, problem, a, f)
 
 
+CALM = {
+    "x": st.tuples(numbers(-18, 18), numbers(-18, 18), numbers(3.5, 9.5)).map(np.array),
+    "v": vectors(0.5),
+    "destination": vectors(40.0),
+    "scale": SCALES,
+}
+"""A calm state inside the limits, and wherever the vehicle is sent."""
+
+
 @LAWS
-@given(
-    x=st.tuples(numbers(-18, 18), numbers(-18, 18), numbers(3.5, 9.5)).map(np.array),
-    v=vectors(0.5),
-    destination=vectors(40.0),
-    scale=SCALES,
-)
+@given(**CALM)
 def test_without_a_field_a_calm_vehicle_keeps_its_box_and_speed(x, v, destination, scale):
     """Wherever it is sent: from a calm state inside the limits every later state can be inside."""
     solution = DEFAULT.solve(DEFAULT.problem(x, v, np.zeros((16, 3)), destination, ZERO, scale), scale)
@@ -183,12 +187,7 @@ def test_without_a_field_a_calm_vehicle_keeps_its_box_and_speed(x, v, destinatio
 
 
 @LAWS
-@given(
-    x=st.tuples(numbers(-18, 18), numbers(-18, 18), numbers(3.5, 9.5)).map(np.array),
-    v=vectors(0.5),
-    destination=vectors(40.0),
-    scale=SCALES,
-)
+@given(**CALM)
 def test_a_calm_vehicle_keeps_least_and_largest_values(x, v, destination, scale):
     """No acceleration and no velocity of its plan is beyond a bound, in either direction."""
     dqmpc = Dqmpc(HorizonConfig(), CostConfig(), LOPSIDED)
