@@ -12,7 +12,7 @@ from companion.config.target_source import FusedSource
 from companion.estimation.fusion import Fusion
 from companion.estimation.turn_rate import turning_path
 from tests.companion.estimation.cameras import START, Vehicle, source_of
-from tests.companion.estimation.test_fusion import STEP, WINDOW, at, fused
+from tests.companion.estimation.flights import STEP, WINDOW, at, fused
 
 Path = Callable[[float], "np.ndarray[tuple[int], np.dtype[np.float64]]"]
 SECONDS = 6.0
