@@ -14,6 +14,13 @@ aims no further ahead than ``reach``, because rest points further ahead leave th
 make the vehicle faster. That is so while agreements rest on ``fresh`` plans: with old ones the planes follow
 late, and rest points must lie further ahead.
 
+A circle that reaches beyond the goal does not fit: the vehicle would fly round further out than it has to go.
+So if ``room`` · min(1, Σ w) · K D / 2π exceeds the distance from the mean place of the encounters to the
+goal, nothing is anticipated, and the deadlock rule (``DeadlockTurn``) resolves the encounter. On the approach
+this distance stays as it is. K falls while vehicles pass; one that began to anticipate among them, when a
+smaller circle fits, would have to pass those that are pushed already. So the decision stays until nobody is
+met, or the goal is another one.
+
 Three kinds of encounters do not count: beyond one of the goals; one that passes more than ``wrong_side`` · D
 on the side of the turn, because it would have to be crossed; and, by as much as it flies to the side of the
 turn and ahead, one beside which the vehicle would stay (``DeadlockTurn``).
@@ -21,7 +28,7 @@ turn and ahead, one beside which the vehicle would stay (``DeadlockTurn``).
 
 from __future__ import annotations
 
-from math import atan2, copysign, hypot, inf, pi
+from math import atan2, copysign, dist, hypot, inf, pi
 from typing import NamedTuple
 
 from companion.config.certified import AnticipationConfig
@@ -33,13 +40,42 @@ _LEAST_WAY_M = 0.5
 
 
 class Anticipated(NamedTuple):
-    """Turn ``angle`` ≥ 0 (rad) of the goal, and the distance (m) that plans may aim ``ahead``."""
+    """Turn ``angle`` ≥ 0 (rad) of the goal, and the distance (m) that plans may aim ``ahead``.
+
+    ``fits``: whether the circle that the encounters need does not reach beyond the goal.
+    """
 
     angle: float
     ahead: float
+    fits: bool = True
 
 
 NOBODY = Anticipated(0.0, inf)
+BEYOND = Anticipated(0.0, inf, fits=False)
+
+
+class Anticipation:
+    """Turns of one vehicle, which leaves encounters whose circle does not fit to the deadlock rule.
+
+    The arguments are those of ``anticipated``.
+    """
+
+    def __init__(self, config: AnticipationConfig, least: float, speed: float, sense: float) -> None:
+        self._config, self._least, self._speed, self._sense = config, least, speed, sense
+        self._left: list[float] | None = None
+
+    def met(self, own: Array, others: Array) -> Anticipated:
+        """Return how to avoid ``others`` (M, 2, 3), m, on the ``own`` way (2, 3), m.
+
+        NOBODY from when a circle does not fit until nobody is met or the goal is another one.
+        """
+        found = anticipated(self._config, self._least, self._speed, own, others, sense=self._sense)
+        goal = own[1].tolist()
+        if found == NOBODY or (self._left is not None and dist(self._left, goal) > _AT_GOAL_M):
+            self._left = None
+        if not found.fits:
+            self._left = goal
+        return found if self._left is None else NOBODY
 
 
 def anticipated(
@@ -49,7 +85,7 @@ def anticipated(
 
     ``least`` (m): the least distance of plans. ``speed`` (m/s): the largest one of the own plans. ``own``
     (2, 3), m: where the own plan begins, and the goal. ``others`` (M, 2, 3), m: where the other vehicles are
-    then, and their goals.
+    then, and their goals. BEYOND: they need a circle that does not fit.
     """
     place, goal = own.tolist()
     way, x, y = _direction(place, goal)
@@ -79,7 +115,10 @@ def anticipated(
     if weights <= 0.0:
         return NOBODY
     radius = config.room * min(weights, 1.0) * (1.0 + weights) * distance / (2.0 * pi)
-    angle = atan2(radius, max(lengths / weights, _LEAST_WAY_M))
+    length = lengths / weights
+    if radius > way - length:
+        return BEYOND
+    angle = atan2(radius, max(length, _LEAST_WAY_M))
     return Anticipated(min(angle, config.most), config.reach * speed)
 
 

@@ -7,7 +7,7 @@ from math import hypot, inf
 import numpy as np
 
 from companion.avoidance.certified.agreements import Agreements
-from companion.avoidance.certified.anticipation import NOBODY, Anticipated, anticipated
+from companion.avoidance.certified.anticipation import NOBODY, Anticipated, Anticipation
 from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.commitment import Commitment, HoldReason
@@ -59,8 +59,8 @@ class CertifiedFlight:
         program = SeparationQp(
             steps, config.limits.within(config.field.margin(1)), certified, planar=config.planar
         )
-        self._sense = _TURNING_SENSES.get(config.turning_sense, 1.0)
-        self._deadlock_turn = DeadlockTurn(certified.deadlock, self._sense)
+        sense = _TURNING_SENSES.get(config.turning_sense, 1.0)
+        self._deadlock_turn = DeadlockTurn(certified.deadlock, sense)
         self.commitment = Commitment(
             certified,
             program,
@@ -79,6 +79,8 @@ class CertifiedFlight:
         least = from_surfaces(certified, config.field, config.limits) + BESIDE_M
         self._way = way_of(config, least, _EFFORT)
         between = self._sources.between
+        speed = min(config.limits.v_max[:2])
+        self._anticipation = Anticipation(certified.anticipation, between, speed, sense)
         downwash = config.field.downwash
         distances = Distances(between, further(certified), steps, planar=config.planar, downwash=downwash)
         self.agreements = Agreements(
@@ -411,10 +413,9 @@ class CertifiedFlight:
             return NOBODY
         places = [plans[s].later(max(begins, plans[s].plan.epoch), 1)[0, 0] for s in met]
         others = np.stack([places, [told[system].position_m for system in met]], axis=1)
-        config, own = self._config.certified.anticipation, np.stack([start.position_m, goal])
-        least, speed = self._sources.between, min(self._config.limits.v_max[:2])
-        found = anticipated(config, least, speed, own, others, sense=self._sense)
-        return found if self.agreements.age(begins, met) <= config.fresh else found._replace(ahead=inf)
+        found = self._anticipation.met(np.stack([start.position_m, goal]), others)
+        fresh = self._config.certified.anticipation.fresh
+        return found if self.agreements.age(begins, met) <= fresh else found._replace(ahead=inf)
 
     def _objective(self, begins: float, aim: Aim, goal: Array, field: Array) -> Objective:
         """Return the preferred places of a plan that begins in ``begins`` s and should end at ``goal`` (3,).

@@ -6,10 +6,10 @@ from math import inf
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.anticipation import NOBODY, Anticipated, anticipated
+from companion.avoidance.certified.anticipation import BEYOND, NOBODY, Anticipated, Anticipation, anticipated
 from companion.avoidance.certified.committed import horizon_of
 from companion.config.certified import AnticipationConfig
 from companion.values.bearings import turned
@@ -33,10 +33,10 @@ def straight(place: tuple[float, float], goal: tuple[float, float], height: floa
     return np.array([[[*place, height], [*goal, height]]])
 
 
-def ring(count: int) -> Array:
-    """Ways (count, 2, 3) of ``count`` that swap places across a circle; the first is that of ``OWN``."""
+def ring(count: int, radius: float = 8.0) -> Array:
+    """Ways (count, 2, 3) of vehicles that swap places across a circle; the first is ``OWN`` on 8 m."""
     angles = np.pi + 2.0 * np.pi * np.arange(count) / count
-    starts = np.stack([8.0 * np.cos(angles), 8.0 * np.sin(angles), np.full(count, 5.0)], axis=1)
+    starts = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.full(count, 5.0)], axis=1)
     return np.stack([starts, starts * (-1.0, -1.0, 1.0)], axis=1)
 
 
@@ -107,6 +107,45 @@ def test_who_flies_the_same_way_on_the_side_of_the_turn_does_not_count() -> None
     """To turn with it would be to stay beside it."""
     crosses = straight((-8.0, 2.0), (6.0, -2.0))
     assert 0.0 < found(crosses).angle < found(crosses * (1.0, -1.0, 1.0)).angle
+
+
+@given(st.integers(2, 20), st.floats(2.0, 20.0), st.floats(0.0, 0.9), st.floats(0.5, 3.0))
+def test_a_circle_fits_where_it_does_not_reach_beyond_the_goals(
+    count: int, radius: float, flown: float, room: float
+) -> None:
+    """However near the meeting place the vehicles are already: that does not move their goals."""
+    ways = ring(count, radius)
+    ways[:, 0] += flown * (ways.mean(axis=1) - ways[:, 0])
+    length, small = max((1.0 - flown) * radius, 0.5), 1e-3
+
+    def mine(room: float) -> Anticipated:
+        config = CONFIG.model_copy(update={"room": room})
+        return anticipated(config, LEAST, SPEED, ways[0], ways[1:], sense=1.0)
+
+    wanted = room / small * length * np.tan(mine(small).angle)
+    assume(abs(wanted - radius) > 1e-6)
+    if wanted > radius:
+        assert mine(room) == BEYOND
+    else:
+        assert mine(room).fits
+        assert mine(room).angle == pytest.approx(min(np.arctan(wanted / length), CONFIG.most))
+
+
+def test_what_does_not_fit_is_left_until_nobody_is_met_or_the_goal_is_another() -> None:
+    crowd, few = ring(16), ring(3)
+    mine = Anticipation(CONFIG, LEAST, SPEED, 1.0)
+    alone = np.empty((0, 2, 3))
+    turned = found(few[1:])
+    assert turned.angle > 0.0
+    assert mine.met(OWN, few[1:]) == turned
+    assert mine.met(OWN, crowd[1:]) == NOBODY
+    # The others pass, one after the other, and a smaller circle would fit.
+    assert mine.met(OWN, few[1:]) == NOBODY
+    assert mine.met(OWN, alone) == NOBODY
+    assert mine.met(OWN, few[1:]) == turned
+    assert mine.met(OWN, crowd[1:]) == NOBODY
+    elsewhere = OWN + np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    assert mine.met(elsewhere, few[1:]).angle > 0.0
 
 
 def swap(most: float, *, old: bool = False) -> tuple[Swarm, float]:
