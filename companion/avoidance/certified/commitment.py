@@ -189,7 +189,7 @@ class Commitment:
         # Of the distance beyond the least one, an agreement leaves each side a half.
         spare = self._config.spare + 2.0 * outside
         corridor = planes(own, others, spare, upright=self._planar)
-        state = State(start.position_m, start.velocity_m_s, self._last_acceleration(), flown)
+        state = State(own[0, 0], start.velocity_m_s, self._last_acceleration(), flown)
         box = None
         if self._sides is not None:
             box = region(own, goal.place, self._sides - 2.0 * self._rounding.max())

@@ -71,8 +71,10 @@ def committed_with_controls(start: WirePlan, accelerations: Array) -> tuple[Wire
 
 def with_accelerations(start: WirePlan, units: npt.NDArray[np.int64]) -> WirePlan:
     """Return the plan from the state that ``start`` begins with; ``units`` (n, 3): of the wire, mm/s²."""
-    knots: tuple[Integers, ...] = tuple((x, y, z) for x, y, z in units.tolist())
-    return WirePlan(*start[:4], knots, *start[5:])
+    x, y, z = units.T.tolist()
+    knots: tuple[Integers, ...] = tuple(zip(x, y, z, strict=True))
+    epoch, dt, position, velocity, _, origin, column = start
+    return WirePlan(epoch, dt, position, velocity, knots, origin, column)
 
 
 def rounding(steps: int, dt: int) -> Array:
@@ -115,7 +117,7 @@ def horizon_of(plan: WirePlan, following: WirePlan | None = None, after: int = 0
     knots = np.empty((first + max(last, 1), 9))
     seconds = plan.dt * 1e-6
     units = 0.5 * _MM * seconds**2, _MM * seconds
-    _knots(plan.position, plan.velocity, accelerations_of(plan)[:first], *units, knots[: first + 1])
+    _knots(plan.position, plan.velocity, _array(plan.accelerations[:first]), *units, knots[: first + 1])
     if following is not None:
         _knots(following.position, following.velocity, accelerations_of(following), *units, knots[first:])
     return Horizon(plan.epoch, plan.dt, knots)
@@ -129,8 +131,11 @@ def rest_time(horizon: Horizon) -> int:
 
 def accelerations_of(plan: WirePlan) -> npt.NDArray[np.int64]:
     """Return the accelerations (n, 3) in units of the wire."""
-    flat = chain.from_iterable(plan.accelerations)
-    return np.fromiter(flat, np.int64, 3 * len(plan.accelerations)).reshape(-1, 3)
+    return _array(plan.accelerations)
+
+
+def _array(accelerations: tuple[Integers, ...]) -> npt.NDArray[np.int64]:
+    return np.fromiter(chain.from_iterable(accelerations), np.int64, 3 * len(accelerations)).reshape(-1, 3)
 
 
 @kernel(BOOL, several(3, INT), array(2), output(2, INT))

@@ -370,10 +370,11 @@ class CertifiedFlight:
         subgoal = self._subgoal(now, epoch, own[-1, 2], destination)
         goal = subgoal.place
         if not self._in_lane:
+            place = own[0, 0]
             met = self._met(now, start, goal) if anticipates else NOBODY
-            goal = self._deadlock_turn.turned(start.position_m, goal, met.angle)
+            goal = self._deadlock_turn.turned(place, goal, met.angle)
             if met.ahead < inf:
-                goal = start.position_m + limit(goal - start.position_m, met.ahead)
+                goal = place + limit(goal - place, met.ahead)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 

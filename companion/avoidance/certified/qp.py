@@ -138,6 +138,7 @@ class SeparationQp:
         # Memory of ``active_set``, and its parts that are the QP in its dual form, by the number that binds.
         most = _MOST_BINDING
         self._active, self._images = np.zeros(most, np.int64), np.zeros((most, 3, n))
+        self._memory = _memory(0, n)
         self._gram, self._missing = np.zeros(most * most), np.zeros(most)
         self._duals = [
             (self._gram[: size * size].reshape(size, size).T, self._missing[:size])
@@ -162,14 +163,12 @@ class SeparationQp:
         Raises SolverError if PIQP finds none, or if rows are still violated after ``_ROUNDS`` QPs or although
         the QP holds them.
         """
-        n = self.n
-        c, start, a_min, a_max = np.empty((4, 3, n))
+        if len(self._memory.whose) < planes.wanted.size:
+            self._memory = _memory(planes.wanted.size, self.n)
+        c, start, of, normals, low, a_min, a_max, whose = self._memory
         places, velocities, field = map(np.ascontiguousarray, objective[:3])
         known: Any = *state[:3], places, velocities, field, *self._cost_parts[objective.moving], c, start
         write_cost(*known)
-        most = _LIMITS * n + planes.wanted.size
-        of, normals, low = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most)
-        whose = np.empty(planes.wanted.size, np.int64)
         # The planes are made so that the committed plan keeps them.
         ranges = self._ranges
         if region is not None:
@@ -239,6 +238,27 @@ class SeparationQp:
         slack = np.empty(len(problem.low))
         row_slacks(np.ascontiguousarray(a), self.dt, problem.of, problem.normals, problem.low, slack)
         return slack
+
+
+class _Memory(NamedTuple):
+    """Memory of a ``_Problem``, which the next one overwrites."""
+
+    c: Array
+    start: Array
+    of: NDArray[np.int64]
+    normals: Array
+    low: Array
+    a_min: Array
+    a_max: Array
+    whose: NDArray[np.int64]
+
+
+def _memory(planes: int, n: int) -> _Memory:
+    """Return memory for a problem of ``n`` steps with up to ``planes`` rows of planes."""
+    rows = _LIMITS * n + planes
+    c, start, a_min, a_max = np.empty((4, 3, n))
+    of, whose = np.empty(rows, np.int64), np.empty(planes, np.int64)
+    return _Memory(c, start, of, np.empty((rows, 3)), np.empty(rows), a_min, a_max, whose)
 
 
 class _Problem(NamedTuple):

@@ -362,11 +362,18 @@ def active_set(
                     worst, violation = i, slack
                 i = after[i]
         for axis in range(3):
+            # Whether any bound is violated more needs no branch for each.
+            lower = upper = np.inf
             for j in range(n):
-                if x[axis, j] - x_min[axis, j] < violation:
-                    worst, violation = rows + axis * n + j, x[axis, j] - x_min[axis, j]
-                if x_max[axis, j] - x[axis, j] < violation:
-                    worst, violation = rows + (3 + axis) * n + j, x_max[axis, j] - x[axis, j]
+                above, below = x[axis, j] - x_min[axis, j], x_max[axis, j] - x[axis, j]
+                lower = above if above < lower else lower
+                upper = below if below < upper else upper
+            if lower < violation or upper < violation:
+                for j in range(n):
+                    if x[axis, j] - x_min[axis, j] < violation:
+                        worst, violation = rows + axis * n + j, x[axis, j] - x_min[axis, j]
+                    if x_max[axis, j] - x[axis, j] < violation:
+                        worst, violation = rows + (3 + axis) * n + j, x_max[axis, j] - x[axis, j]
         if worst < 0:
             for k in range(count):
                 for i in range(count):
