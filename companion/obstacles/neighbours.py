@@ -7,7 +7,7 @@ configured.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from functools import lru_cache
 from itertools import chain, compress
 from math import hypot, inf
@@ -472,12 +472,17 @@ class Neighbours:
             return None
         return sender.track.dated(now, stamp)
 
-    def last_received(self) -> list[tuple[int, int, Array, Array]]:
-        """Return system id, time (µs), position (3,) and velocity (3,) of each neighbour's last state."""
+    def last_received(self, without: Set[int] = frozenset()) -> list[tuple[int, int, Array, Array]]:
+        """Return system id, time (µs), position (3,) and velocity (3,) of each neighbour's last state.
+
+        The systems ``without`` which it is are left out.
+        """
         self._update_rows()
+        times, states = self._times, self._states
         return [
-            (system, int(time), state[0:3], state[3:6])
-            for system, time, state in zip(self._ids, self._times, self._states, strict=True)
+            (system, int(times[row]), states[row, 0:3], states[row, 3:6])
+            for row, system in enumerate(self._ids)
+            if system not in without
         ]
 
     def ages(self, now: int) -> dict[int, int]:

@@ -66,11 +66,11 @@ class Sensed:
 
         Each obstacle is given by its points nearest to the predicted positions.
         """
+        if self.proximity is None and self.traffic is None:
+            return Axes((), np.empty((0, len(prediction), 3)), np.empty(0))
         parts = [
             part.around(now, prediction, reach) for part in (self.proximity, self.traffic) if part is not None
         ]
-        if not parts:
-            return Axes((), np.empty((0, len(prediction), 3)), np.empty(0))
         ids, positions, radii = zip(*parts, strict=True)
         return Axes(sum(ids, ()), np.concatenate(positions), np.concatenate(radii))
 

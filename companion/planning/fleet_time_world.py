@@ -5,6 +5,8 @@ The picture itself is in the companion's own time, because it dates messages by 
 
 from __future__ import annotations
 
+from collections.abc import Set
+
 from companion.avoidance.certified.fleet_clock import FleetClock
 from companion.obstacles.static import Axes
 from companion.values.horizon import Array
@@ -17,9 +19,9 @@ class _Neighbours:
     def __init__(self, world: World, clock: FleetClock) -> None:
         self._neighbours, self._clock = world.neighbours, clock
 
-    def last_received(self) -> list[tuple[int, int, Array, Array]]:
+    def last_received(self, without: Set[int] = frozenset()) -> list[tuple[int, int, Array, Array]]:
         """Return ``Neighbours.last_received`` in fleet time."""
-        return self._in_fleet_time(self._neighbours.last_received())
+        return self._in_fleet_time(self._neighbours.last_received(without))
 
     def as_arrived(self) -> list[tuple[int, int, Array, Array]]:
         """Return ``Neighbours.as_arrived`` in fleet time."""

@@ -95,24 +95,28 @@ class ConstraintSources:
             *(self._sensed_constraints(sensed) if sensed.ids else ()),
         ]
         count, n = len(agreed), self._steps
-        bases = [pair.own.bytes_from(begins, n) for pair in agreed]
-        controls = [pair.other.bytes_from(begins, n) for pair in agreed]
+        bases = _memory([pair.own for pair in agreed], begins, n)
+        controls = _memory([pair.other for pair in agreed], begins, n)
         if unshared:
             bases += [own.tobytes()] * len(unshared)
             controls += [centres.tobytes() for centres, _ in unshared]
-        distance = np.full((len(bases), n), self.between)
+        # Without np.full, np.ones and the like, which take several times as long.
+        distance = np.empty((len(bases), n))
+        distance.fill(self.between)
         for index, (one, other) in enumerate(agreed):
             if columns := one.plan.column + other.plan.column:
                 controls[index] = levelled(other.later(begins, n), one.later(begins, n)).tobytes()
                 distance[index] += columns * self._further
         for index, (_, radii) in enumerate(unshared, count):
             distance[index] = radii
-        heights = np.ones(len(bases))
+        heights = np.empty(len(bases))
+        heights.fill(1.0)
         if self._config.field.downwash > 1.0:
             last, first = count + len(lasts), len(bases) - len(noncooperative) - len(sensed.ids)
             of_vehicles = [*range(last), *range(first, first + len(strangers))]
             heights[of_vehicles] = 1.0 / self._config.field.downwash
-        shares = np.arange(len(bases)) < count
+        shares = np.zeros(len(bases), np.bool_)
+        shares[:count] = True
         others = Others(
             _stacked(bases, n),
             _stacked(controls, n),
@@ -140,8 +144,10 @@ class ConstraintSources:
 
         So posts act as if they had no top.
         """
+        found: list[tuple[Array, float]] = []
+        if not self._round:
+            return found
         points = own.reshape(-1, 3)
-        found = []
         for fixed, upright in ((self._balls, False), (self._posts, True)):
             if not len(fixed):
                 continue
@@ -276,6 +282,16 @@ class ConstraintSources:
             return found
         nearest = np.argsort(found.distance(here[None, :2])[0], kind="stable")[:_MOST_BOXES]
         return Rectangles(*(part[nearest] for part in found))
+
+
+def _memory(plans: list[StoredPlan], epoch: int, rows: int) -> list[bytes]:
+    """Return ``bytes_from`` of all ``plans``; of a plan that follows itself it is made once."""
+    found, last, data = [], None, b""
+    for plan in plans:
+        if plan is not last:
+            last, data = plan, plan.bytes_from(epoch, rows)
+        found.append(data)
+    return found
 
 
 def _stacked(plans: list[bytes], steps: int) -> Array:

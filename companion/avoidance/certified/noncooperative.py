@@ -68,7 +68,8 @@ class NonCooperative:
         """
         found = []
         neighbours = world.neighbours
-        for system, time, position, velocity in (*neighbours.last_received(), *neighbours.as_arrived()):
+        received = *neighbours.last_received(members), *neighbours.as_arrived()
+        for system, time, position, velocity in received:
             if system not in members:
                 age = max(1e-6 * (begins - time), 0.0)
                 found.append(
