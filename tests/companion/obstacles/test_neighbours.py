@@ -345,6 +345,17 @@ def test_only_differences_of_time_matter(shift, late, speed):
     np.testing.assert_array_equal(results[0], results[1])
 
 
+@given(without=st.sets(st.integers(OTHER, OTHER + 4)))
+def test_last_states_without_some_systems_are_those_of_the_others(without):
+    neighbours = hearing(*(position(X + k, V, system=OTHER + k) for k in range(4)))
+    assert [one[0] for one in neighbours.last_received()] == [OTHER + k for k in range(4)]
+    expected = [one for one in neighbours.last_received() if one[0] not in without]
+    found = neighbours.last_received(without)
+    assert [one[:2] for one in found] == [one[:2] for one in expected]
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one[2:], other[2:])
+
+
 def test_each_neighbour_keeps_its_own_plan():
     messages = [
         m for k in range(5) for m in (position(k * X, k * V, 20 + k), plan(k * X, k * V, system=20 + k))
