@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.errors import CertificateError
-from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, output, several
+from companion.values.compiled import BOOL, FLOAT, INT, VOID, array, kernel, output, part, several
 from companion.values.horizon import Array, Horizon
 from mavlink_bridge.wire.plan import Integers, WirePlan, quantise
 
@@ -63,10 +63,11 @@ def committed(start: WirePlan, accelerations: Array) -> WirePlan:
 def committed_with_controls(start: WirePlan, accelerations: Array) -> tuple[WirePlan, Array]:
     """Return the plan of ``committed`` and its ``controls``."""
     rounded: npt.NDArray[np.int64] = np.empty(accelerations.shape, np.int64)
-    if not _rounded(start.velocity, np.ascontiguousarray(accelerations), rounded):
+    points = np.empty((len(accelerations), 3, 3))
+    state = start.position, start.velocity
+    if not _rounded(*state, np.ascontiguousarray(accelerations), _metre(start), rounded, points):
         raise CertificateError("an acceleration is not finite")
-    plan = with_accelerations(start, rounded)
-    return plan, _controls_of(plan, rounded)
+    return with_accelerations(start, rounded), points
 
 
 def with_accelerations(start: WirePlan, units: npt.NDArray[np.int64]) -> WirePlan:
@@ -103,8 +104,13 @@ def controls_and_accelerations(plan: WirePlan) -> tuple[Array, Array]:
 
 def _controls_of(plan: WirePlan, accelerations: npt.NDArray[np.int64]) -> Array:
     points = np.empty((len(accelerations), 3, 3))
-    _controls(plan.position, plan.velocity, accelerations, 0.5 * _MM * (plan.dt * 1e-6) ** 2, points)
+    _controls(plan.position, plan.velocity, accelerations, _metre(plan), points)
     return points
+
+
+def _metre(plan: WirePlan) -> float:
+    """Return the unit of positions, m."""
+    return 0.5 * _MM * (plan.dt * 1e-6) ** 2
 
 
 def horizon_of(plan: WirePlan, following: WirePlan | None = None, after: int = 0) -> Horizon:
@@ -138,22 +144,8 @@ def _array(accelerations: tuple[Integers, ...]) -> npt.NDArray[np.int64]:
     return np.fromiter(chain.from_iterable(accelerations), np.int64, 3 * len(accelerations)).reshape(-1, 3)
 
 
-@kernel(BOOL, several(3, INT), array(2), output(2, INT))
-def _rounded(velocity: Integers, accelerations: Array, rounded: npt.NDArray[np.int64]) -> bool:
-    """Write the ``rounded`` accelerations (n, 3) that end at rest; return whether all are finite."""
-    n = len(accelerations)
-    for axis in range(3):
-        left = -velocity[axis]
-        for k in range(n):
-            if not np.isfinite(accelerations[k, axis]):
-                return False
-            rounded[k, axis] = left if k == n - 1 else int(np.rint(accelerations[k, axis] / _MM))
-            left -= rounded[k, axis]
-    return True
-
-
-@kernel(VOID, *[several(3, INT)] * 2, array(2, INT), FLOAT, output(3))
-def _controls(
+@part
+def _write_controls(
     position: Integers, velocity: Integers, accelerations: npt.NDArray[np.int64], unit: float, points: Array
 ) -> None:
     """Write the control points (n, 3, 3) of a plan in units of the wire; ``unit``: that of positions (m)."""
@@ -167,6 +159,39 @@ def _controls(
                 (p + 2 * v + a) * unit,
             )
             p, v = p + 2 * v + a, v + a
+
+
+@kernel(BOOL, *[several(3, INT)] * 2, array(2), FLOAT, output(2, INT), output(3))
+def _rounded(
+    position: Integers,
+    velocity: Integers,
+    accelerations: Array,
+    unit: float,
+    rounded: npt.NDArray[np.int64],
+    points: Array,
+) -> bool:
+    """Write the ``rounded`` accelerations (n, 3) that end at rest, and the control points ``points``.
+
+    Returned is whether all are finite; otherwise the result is incomplete.
+    """
+    n = len(accelerations)
+    for axis in range(3):
+        left = -velocity[axis]
+        for k in range(n):
+            if not np.isfinite(accelerations[k, axis]):
+                return False
+            rounded[k, axis] = left if k == n - 1 else int(np.rint(accelerations[k, axis] / _MM))
+            left -= rounded[k, axis]
+    _write_controls(position, velocity, rounded, unit, points)
+    return True
+
+
+@kernel(VOID, *[several(3, INT)] * 2, array(2, INT), FLOAT, output(3))
+def _controls(
+    position: Integers, velocity: Integers, accelerations: npt.NDArray[np.int64], unit: float, points: Array
+) -> None:
+    """Write the control points of a plan, see ``_write_controls``."""
+    _write_controls(position, velocity, accelerations, unit, points)
 
 
 @kernel(VOID, *[several(3, INT)] * 2, array(2, INT), FLOAT, FLOAT, output(2))
