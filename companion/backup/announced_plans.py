@@ -52,12 +52,13 @@ class AnnouncedPlans:
     def horizon(self, now: int) -> Horizon | None:
         """Return the committed plan at ``now`` (µs): the newest that has begun; None without one.
 
-        A column whose plan has no vertical motion is at ``height``.
+        Before any has begun that is the first one, if it never moves: its companion holds the place of its
+        first plan from the announcement on. A column whose plan has no vertical motion is at ``height``.
         """
-        epoch = max((epoch for epoch in self._plans if epoch <= now), default=None)
-        if epoch is None:
+        plan = self._flown(now)
+        if plan is None:
             return None
-        plan, height = self._plans[epoch], self.height
+        height = self.height
         if not plan.column or any(a[2] for a in (plan.velocity, *plan.accelerations)):
             height = None
         if self._cached is None or self._cached[0] is not plan or self._cached[1] != height:
@@ -66,3 +67,12 @@ class AnnouncedPlans:
                 horizon.knots[:, 2], horizon.knots[:, 5::3] = height, 0.0
             self._cached = plan, height, horizon
         return self._cached[2]
+
+    def _flown(self, now: int) -> WirePlan | None:
+        """Return the newest plan that has begun at ``now`` (µs), or the first one if it never moves."""
+        epoch = max((epoch for epoch in self._plans if epoch <= now), default=None)
+        if epoch is not None:
+            return self._plans[epoch]
+        first = self._plans[min(self._plans)] if self._plans else None
+        moves = first is None or any(map(any, (first.velocity, *first.accelerations)))
+        return None if moves else first

@@ -112,7 +112,11 @@ class Bench:
     def _spoken(self) -> SetpointLocal:
         """What the companion sends: its plan, by its own clock."""
         now = self.now + self.ahead
-        plan = max((p for p in self.plans if p.epoch <= now), default=plan_from(BEGIN), key=lambda p: p.epoch)
+        plan = max(
+            (p for p in self.plans if p.epoch <= now),
+            default=[*self.plans, plan_from(BEGIN)][0],
+            key=lambda p: p.epoch,
+        )
         place = horizon_of(plan).at(now + CONFIG.setpoint_lead_us).position
         place[0] += self.east
         if self.height is not None:
@@ -332,6 +336,46 @@ def test_its_farewell_is_accepted_by_the_others_with_which_there_was_an_agreemen
     for system, since, expected in ((12, BEGIN, True), (12, BEGIN + 1_000_000, False), (13, BEGIN, False)):
         # The second has begun anew since, and the third has never agreed: this farewell may be an old one.
         assert accepted(bench, system, since) is expected
+
+
+def starting(place: tuple[float, float, float], moves: float = 0.0) -> Bench:
+    """A companion that announced its first plan, held ``place``, and ended before this plan began."""
+    bench = Bench()
+    begins = BEGIN + 800_000
+    plan = resting(begins, DT, STEPS, place, FLEET.fingerprint, column=False)
+    bench.plans = [committed(plan, np.full((STEPS, 3), moves))]
+    assert bench.run(0.3) == []
+    said = Statement(
+        fingerprint(CONFIG, FLEET), begins, begins, (Entry(12, ((begins, begins),), (begins, begins)),)
+    )
+    bench.node.step(
+        bench.now, [bench.tell("swarm", Tunnel(COMPANION, 0, 0, AGREEMENTS, pack_statement(said)))]
+    )
+    bench.speaks = False
+    return bench
+
+
+def test_a_first_plan_at_rest_is_held_before_it_begins_and_is_the_last_one() -> None:
+    """The others may have agreed on it, and would wait for a farewell for ever."""
+    bench = starting((1.0, 2.0, 5.0))
+    held = bench.run(0.4)
+    assert held
+    assert all(np.allclose(sent.position, (2.0, 1.0, -5.0), atol=1e-3) for _, sent in held)
+    assert bench.node.farewell(bench.now) == [], "the plan has not begun by the clocks of all"
+    bench.run(1.0)
+    assert accepted(bench, 12, BEGIN + 800_000)
+
+
+@pytest.mark.parametrize(("moves", "east"), [(0.5, 0.0), (0.0, 0.5)])
+def test_a_first_plan_that_moves_or_is_elsewhere_is_not_held(moves: float, east: float) -> None:
+    bench = Bench()
+    bench.east = east
+    plan = resting(BEGIN + 800_000, DT, STEPS, (1.0, 2.0, 5.0), FLEET.fingerprint, column=False)
+    bench.plans = [committed(plan, np.full((STEPS, 3), moves))]
+    bench.run(0.3)
+    bench.speaks = False
+    assert bench.run(2.0) == []
+    assert bench.node.farewell(bench.now) == []
 
 
 def test_its_farewell_is_accepted_by_others_whose_plans_it_has_received_since() -> None:
