@@ -12,9 +12,9 @@ The backup node continues only a plan that is known to be flown: the companion's
 with the plan that the backup node holds, by its own clock and in its own local frame. A column is continued
 at the height of that set-point, and only the horizontal distance counts, unless its plan still moves
 vertically. Before the first plan of a companion begins, that plan counts if it never moves. The backup node
-must start before the companion steers; otherwise it waits for the next plan. It adds to the plan what the companion adds (``plan_feedforward``, ``sent_compensation``). The companion's
-command to land, its farewell, another mode, a disarmed vehicle or three seconds without a heartbeat discard
-all plans.
+must start before the companion steers; otherwise it waits for the next plan. It adds to the plan what the
+companion adds (``plan_feedforward``, ``sent_compensation``). The companion's command to land, its farewell,
+another mode, a disarmed vehicle or three seconds without a heartbeat discard all plans.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 
@@ -95,11 +95,12 @@ class Surroundings:
         seconds: Array = 1e-6 * (now + certified.epoch_us - self._now + certified.dt_us * halves)
         return self._near(seconds, prediction, reach)
 
-    def last_received(self) -> list[tuple[int, int, Array, Array]]:
-        """Return id, time (µs), position (3,) and velocity (3,) of each neighbour."""
+    def last_received(self, without: Set[int] = frozenset()) -> list[tuple[int, int, Array, Array]]:
+        """Return id, time (µs), position (3,) and velocity (3,) of the neighbours not in ``without``."""
         return [
             (one.id, self._time_of(one), np.asarray(one.position), np.asarray(one.velocity))
             for one in self._neighbours
+            if one.id not in without
         ]
 
     def as_arrived(self) -> list[tuple[int, int, Array, Array]]:
