@@ -475,7 +475,7 @@ class Neighbours:
     def last_received(self, without: Set[int] = frozenset()) -> list[tuple[int, int, Array, Array]]:
         """Return system id, time (µs), position (3,) and velocity (3,) of each neighbour's last state.
 
-        The systems ``without`` which it is are left out.
+        Systems in ``without`` are left out.
         """
         self._update_rows()
         times, states = self._times, self._states
