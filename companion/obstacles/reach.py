@@ -33,6 +33,8 @@ class Reach:
         self._braking, self._time, self._fastest = braking, time, fastest
         self._radii = np.zeros(0)
         self._ages = np.zeros(0, dtype=np.int64)
+        self._gaps = np.zeros(0)
+        self._earlier = [self._gaps, self._gaps]
         self._called = 0
 
     def grown(self, now: int, ages: Ages, speeds: Array, distances: Array, spread: Array) -> Array:
@@ -49,8 +51,15 @@ class Reach:
         radii = spread.copy()
         radii[:known] = np.where(heard[:known], radii[:known], self._radii)
         gaps = np.maximum(distances - radii, 0.0)
+        if elapsed > 0:
+            self._earlier = [self._gaps, self._earlier[0]]
+        # At the beginning of the time since the last call the neighbour was as fast as the gap at its plan
+        # before that allowed.
+        widest = gaps.copy()
+        for earlier in self._earlier:
+            widest[: len(earlier)] = np.maximum(widest[: len(earlier)], earlier)
         coasting = speeds - 1e-6 * self._braking * ages
-        rates = np.minimum(np.maximum(allowed(gaps, self._braking, self._time), coasting), self._fastest)
+        rates = np.minimum(np.maximum(allowed(widest, self._braking, self._time), coasting), self._fastest)
         self._radii = radii + 1e-6 * np.where(heard, ages, elapsed) * rates
-        self._ages, self._called = ages.copy(), now
+        self._ages, self._gaps, self._called = ages.copy(), gaps, now
         return self._radii

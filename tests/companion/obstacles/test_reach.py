@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from companion.config import CompanionConfig
@@ -91,12 +91,13 @@ def together(count, radius, loss, seed, seconds):
 
 @MANY
 @given(seed=st.integers(0, 2**32 - 1), loss=st.sampled_from([0.5, 0.9, 0.97, 1.0]), count=st.integers(2, 3))
+@example(seed=755_341, loss=0.9, count=2)
 def test_vehicles_that_fly_at_each_other_do_not_meet_with_losses_of_their_own(seed, loss, count):
     """In each direction a loss of its own, and some hear one of the others not at all."""
     least, beyond = together(count, 7.0, loss, seed, 10)
     assert least > D_MIN
     # Nobody was nearer than the other one's bound for it, but for what both fly in a step.
-    assert beyond < 0.05
+    assert beyond < 0.01
 
 
 def test_a_place_just_heard_is_no_larger_than_its_error():
@@ -107,7 +108,7 @@ def test_a_place_just_heard_is_no_larger_than_its_error():
 
 def test_it_grows_as_fast_as_one_may_come_and_never_up_to_the_own_place():
     reach, none = Reach(2.0, 1.6, 8.0), np.zeros(1)
-    reach.grown(0, np.array([0]), none, np.array([4.0]), none)
+    reach.grown(0, np.array([0]), none, np.array([1.5]), none)
     last = 0.0
     for now in range(50_000, 15_000_000, 50_000):
         radius = float(reach.grown(now, np.array([now]), none, np.array([1.5]), none)[0])
@@ -155,7 +156,9 @@ def test_two_inside_d_min_part(apart, planned, losses, seed):
             least = min(least, float(np.linalg.norm(pair[0].place - pair[1].place)))
         assert least > apart - 1e-6
         if sign > 0.0:
-            assert np.linalg.norm(pair[0].place - pair[1].place) > D_MIN + 0.1
+            # From where hardly anything lacks they move hardly further than d_min.
+            parted = np.linalg.norm(pair[0].place - pair[1].place)
+            assert parted > (D_MIN + 0.1 if apart < D_MIN - 0.01 else D_MIN - 1e-6)
 
 
 def test_a_state_that_becomes_older_again_is_as_uncertain_as_any_of_its_age():
