@@ -12,6 +12,7 @@ from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.committed import carried_on, committed, horizon_of, resting
 from companion.avoidance.certified.fingerprint import fingerprint, identity
 from companion.avoidance.certified.negotiation import Geometry
+from companion.avoidance.certified.separating_planes import AGREED
 from companion.backup_node import BackupNode
 from companion.config import CompanionConfig
 from companion.config.flight import TrackingConfig
@@ -399,7 +400,13 @@ def test_its_farewell_is_accepted_by_others_whose_plans_it_has_received_since() 
 def accepted(bench: Bench, system: int, since: int) -> bool:
     """Whether ``system``, which begins at ``since`` (µs), accepts the backup node's farewell now."""
     certified, known = CONFIG.certified, identity(CONFIG, FLEET)
-    agreements = Agreements(system, certified, STEPS, known, Geometry(lambda *_: True, lambda *_: True))
+    agreements = Agreements(
+        system,
+        certified,
+        STEPS,
+        known,
+        Geometry(lambda *_: True, lambda *_: True, lambda *_: np.zeros((1, AGREED))),
+    )
     agreements.begin(since)
     agreements.made(plan_from(since, seed=2))
     for message in bench.node.farewell(bench.now):

@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
+from companion.avoidance.certified.agreed_planes import AgreedPlanes
 from companion.avoidance.certified.committed import horizon_of
 from companion.avoidance.certified.fingerprint import FleetIdentity
-from companion.avoidance.certified.negotiation import AgreedPlans, Geometry, Negotiation
+from companion.avoidance.certified.negotiation import Geometry, Negotiation
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan, read, stored
 from companion.config.certified import CertifiedConfig
-from companion.errors import CompanionError
 from companion.values.horizon import Array
 from companion.values.refused_senders import RefusedSenders
 from mavlink_bridge.errors import PlanWireError
@@ -387,16 +387,9 @@ class Agreements:
             for peer in self._peers.values()
         )
 
-    def agreed(self) -> list[AgreedPlans]:
-        """Return the plans of all agreements that are kept, in the order of system ids."""
-        found = []
-        for system, peer in sorted(self._peers.items()):
-            for one in peer.pair.kept:
-                plans = self._negotiation.plans_of(peer, one)
-                if plans is None:
-                    raise CompanionError(f"the plans of the agreement {one} with {system} are not filed")
-                found.append(plans)
-        return found
+    def agreed(self) -> list[AgreedPlanes]:
+        """Return the planes of all agreements that are kept, in the order of system ids."""
+        return [peer.agreed[one] for _, peer in sorted(self._peers.items()) for one in peer.pair.kept]
 
     def unanswered(self) -> list[WirePlan]:
         """Return the own plans of proposals without an answer, the oldest first, without the newest plan.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from companion.avoidance.certified.separating_planes import apart, keeps
+from companion.avoidance.certified.separating_planes import agreed_planes, apart, keeps
 from companion.values.horizon import Array
 
 _ROUNDING_M = 1e-6
@@ -35,6 +35,14 @@ class Distances:
     def least(self, columns: int) -> float:
         """Return the least distance (m) between two plans of which ``columns`` are columns."""
         return self._between + columns * self._further
+
+    def agreed(self, own: Array, other: Array, columns: int) -> Array:
+        """Return the rows of ``agreed_planes`` of the plans ``own`` and ``other``.
+
+        Both are control points (k, 3, 3), m, on the same knots. ``columns``: number of columns among them.
+        """
+        seen = levelled(other, own) if columns else other
+        return agreed_planes(own, seen, self.least(columns), upright=self._planar, downwash=self._downwash)
 
     def keeps(self, newest: Array, own: Array, other: Array, columns: int) -> bool:
         """Return whether ``newest`` keeps the own side of the planes of the plans ``own`` and ``other``.

@@ -235,7 +235,7 @@ class Commitment:
     ) -> None:
         """Make ``plan``, with control points (n, 3, 3), m, that of the next epoch; learn from ``answer``."""
         length = 1e-6 * self._config.dt_us * self._program.n
-        pushes = Pushes(answer.forces, mean_velocities(others.controls, length, len(answer.forces)))
+        pushes = Pushes(answer.forces, mean_velocities(others, length, len(answer.forces)))
         moving = objective.moving
         gradient = self._program.costs[moving].gradient_per_metre
         seconds = 1e-6 * self._config.epoch_us

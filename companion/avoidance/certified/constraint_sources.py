@@ -10,6 +10,7 @@ from math import hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.avoidance.certified.agreed_planes import stacked
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.columns import levelled
 from companion.avoidance.certified.committed import horizon_of
@@ -59,6 +60,8 @@ class ConstraintSources:
         self._balls = FixedObstacles([one for one in self._round if isinstance(one, Sphere)])
         self._boxes = BoxIndex(boxes_of(config.obstacles))
         self._noncooperative = NonCooperative(config, steps)
+        none = np.empty((0, steps, 3, 3))
+        self._nothing = none, none, np.empty((0, steps)), np.empty(0, np.bool_), np.empty(0)
         widest = max(self.between, self._from_surfaces)
         self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + widest + _SIGHT_MARGIN_M
 
@@ -71,7 +74,7 @@ class ConstraintSources:
         ``own`` (n, 3, 3), m: the committed control points from the next epoch on.
         """
         begins = epoch + self._config.certified.epoch_us
-        agreed, left = agreements.agreed(), agreements.left
+        left = agreements.left
         aside = self._beside_last_plan(now, left, world)
         # A vehicle that said farewell may drift while it descends. One that is further than ``between`` from
         # its last plan may be flown by another controller, at any height: it counts as non-cooperative while
@@ -94,39 +97,33 @@ class ConstraintSources:
             *noncooperative,
             *(self._sensed_constraints(sensed) if sensed.ids else ()),
         ]
-        count, n = len(agreed), self._steps
-        bases = _memory([pair.own for pair in agreed], begins, n)
-        controls = _memory([pair.other for pair in agreed], begins, n)
-        if unshared:
-            bases += [own.tobytes()] * len(unshared)
-            controls += [centres.tobytes() for centres, _ in unshared]
-        # Without np.full, np.ones and the like, which take several times as long.
-        distance = np.empty((len(bases), n))
-        distance.fill(self.between)
-        for index, (one, other) in enumerate(agreed):
-            if columns := one.plan.column + other.plan.column:
-                controls[index] = levelled(other.later(begins, n), one.later(begins, n)).tobytes()
-                distance[index] += columns * self._further
-        for index, (_, radii) in enumerate(unshared, count):
-            distance[index] = radii
-        heights = np.empty(len(bases))
-        heights.fill(1.0)
-        if self._config.field.downwash > 1.0:
-            last, first = count + len(lasts), len(bases) - len(noncooperative) - len(sensed.ids)
-            of_vehicles = [*range(last), *range(first, first + len(strangers))]
-            heights[of_vehicles] = 1.0 / self._config.field.downwash
-        shares = np.zeros(len(bases), np.bool_)
-        shares[:count] = True
+        first = len(unshared) - len(noncooperative) - len(sensed.ids)
+        vehicles = [*range(len(lasts)), *range(first, first + len(strangers))]
         others = Others(
-            _stacked(bases, n),
-            _stacked(controls, n),
-            distance,
-            shares,
-            heights,
+            *self._unshared(own, unshared, vehicles),
             self._boxes_near(own),
             self._from_surfaces,
+            stacked(agreements.agreed(), begins, self._steps),
         )
         return others, self._noncooperative.field(seen, own, sensed)
+
+    def _unshared(
+        self, own: Array, given: list[tuple[Array, Array | float]], vehicles: list[int]
+    ) -> tuple[Array, Array, Array, NDArray[np.bool_], Array]:
+        """Return the first five parts of ``Others`` for what keeps no distance itself.
+
+        ``given``: its control points (n, 3, 3) and least distances, m, of which those of ``vehicles`` count
+        heights as vehicles do.
+        """
+        if not given:
+            return self._nothing
+        distance = np.empty((len(given), self._steps))
+        for index, (_, radii) in enumerate(given):
+            distance[index] = radii
+        heights = np.ones(len(given))
+        heights[vehicles] = 1.0 / self._config.field.downwash
+        shares = np.zeros(len(given), np.bool_)
+        return np.stack([own] * len(given)), np.stack([one for one, _ in given]), distance, shares, heights
 
     def _beyond_range(self, distant: dict[int, int], world: World) -> set[int]:
         """Return those of the ``distant`` vehicles that constrain no plan.
@@ -282,21 +279,6 @@ class ConstraintSources:
             return found
         nearest = np.argsort(found.distance(here[None, :2])[0], kind="stable")[:_MOST_BOXES]
         return Rectangles(*(part[nearest] for part in found))
-
-
-def _memory(plans: list[StoredPlan], epoch: int, rows: int) -> list[bytes]:
-    """Return ``bytes_from`` of all ``plans``; of a plan that follows itself it is made once."""
-    found, last, data = [], None, b""
-    for plan in plans:
-        if plan is not last:
-            last, data = plan, plan.bytes_from(epoch, rows)
-        found.append(data)
-    return found
-
-
-def _stacked(plans: list[bytes], steps: int) -> Array:
-    """Return ``plans``, the memory of (n, 3, 3), as one array (M, n, 3, 3)."""
-    return np.frombuffer(b"".join(plans)).reshape(-1, steps, 3, 3)
 
 
 def _discs(found: list[tuple[tuple[float, ...], float, float]]) -> Discs:

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.avoidance.certified.separating_planes import AGREED, Others
 from companion.config.certified import DeadlockConfig
 from companion.values.bearings import rotated, turned
 from companion.values.compiled import FLOAT, VOID, array, kernel, output, several
@@ -134,13 +135,14 @@ class DeadlockTurn:
             self.angle = max(0.0, self.angle - config.down * seconds / (1.0 + overtime))
 
 
-def mean_velocities(controls: Array, seconds: float, count: int) -> Array:
+def mean_velocities(others: Others, seconds: float, count: int) -> Array:
     """Return the mean velocities (count, 3), m/s, of plans of ``seconds``; zero for those without a plan.
 
-    ``controls`` (M, n, 3, 3), m: control points of the first M ≤ count.
+    The first are those of the agreements and pairs of ``others``, of which there are ``count`` at most.
     """
     found = np.zeros((count, 3))
-    _mean_velocities(np.ascontiguousarray(controls), seconds, found)
+    agreed = np.empty((0, 1, AGREED)) if others.agreed is None else others.agreed
+    _mean_velocities(agreed, np.ascontiguousarray(others.controls), seconds, found)
     return found
 
 
@@ -148,12 +150,15 @@ def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel(VOID, array(4), FLOAT, output(2))
-def _mean_velocities(controls: Array, seconds: float, found: Array) -> None:
-    last = controls.shape[1] - 1
+@kernel(VOID, array(3), array(4), FLOAT, output(2))
+def _mean_velocities(agreed: Array, controls: Array, seconds: float, found: Array) -> None:
+    count, last = len(agreed), controls.shape[1] - 1
+    for m in range(count):
+        for axis in range(9, 12):
+            found[m, axis - 9] = (agreed[m, agreed.shape[1] - 1, axis] - agreed[m, 0, axis]) / seconds
     for m in range(len(controls)):
         for axis in range(3):
-            found[m, axis] = (controls[m, last, 2, axis] - controls[m, 0, 0, axis]) / seconds
+            found[count + m, axis] = (controls[m, last, 2, axis] - controls[m, 0, 0, axis]) / seconds
 
 
 @kernel(several(3), array(2), array(2), several(3), several(3), FLOAT)

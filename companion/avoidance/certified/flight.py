@@ -88,7 +88,7 @@ class CertifiedFlight:
             certified,
             steps,
             identity(config, fleet),
-            Geometry(distances.keeps, distances.apart),
+            Geometry(distances.keeps, distances.apart, distances.agreed),
             None if self._vicinity is None else self._beyond,
         )
         self.reservation = Reservation(

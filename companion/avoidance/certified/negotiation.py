@@ -11,6 +11,7 @@ from collections.abc import Callable
 from math import inf
 from typing import NamedTuple
 
+from companion.avoidance.certified.agreed_planes import Rows, made
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan
@@ -33,12 +34,13 @@ class Geometry(NamedTuple):
     """Tests of plans, which are control points (n + 1, 3, 3), m, on the same knots.
 
     ``keeps``: whether the first plan keeps the own side of the planes of a pair of plans, the own and the
-    other. ``apart``: whether two plans are the least distance apart. Both take the number of columns among
-    the pair of plans, see ``columns.Distances``.
+    other. ``apart``: whether two plans are the least distance apart. ``agreed``: what the planes of a pair of
+    plans are made of. All take the number of columns among the pair of plans, see ``columns.Distances``.
     """
 
     keeps: Callable[[Array, Array, Array, int], bool]
     apart: Callable[[Array, Array, int], bool]
+    agreed: Rows
 
 
 class AgreedPlans(NamedTuple):
@@ -80,13 +82,13 @@ class Negotiation:
                     refused = refused or one
                 continue
             if self._taken_in_time(newest, one, plans) and self._unambiguous(peer, plans, one.epoch):
-                pair.take(one)
-                peer.changed = True
+                peer.agree(one, made(*plans, self._geometry.agreed))
                 break
             refused = refused or one
         other = peer.plans.before(epoch)
         if other is not None and self._worthwhile(now, peer, AgreedPlans(newest, other)):
-            peer.propose(now, Agreement(epoch, other.plan.epoch))
+            planes = made(newest, other, self._geometry.agreed)
+            peer.propose(now, Agreement(epoch, other.plan.epoch), planes)
         elif refused is not None and pair.newer(refused, pair.considered):
             pair.refuse(refused)
             peer.changed = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from companion.avoidance.certified.agreed_planes import AgreedPlanes
 from companion.avoidance.certified.committed import carried_on
 from companion.avoidance.certified.pair import Agreement, Pair
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan
@@ -29,11 +30,13 @@ class Peer:
     ``round_trip`` (µs): from a proposal to its answer. ``changed``: the entry about it has changed since it
     was last stated. ``settled``: the own newest plan with which the negotiation had nothing to do, and has
     nothing to do until ``settled_until`` (µs) if nothing new is known of the peer; None: it must look.
+    ``agreed``: the planes of all agreements that the own list holds.
     """
 
     def __init__(self, own: int, system: int, *, parts: bool = False) -> None:
         self._own = own
         self.plans, self.pair = PlanFile(), Pair(own, system, parts=parts)
+        self.agreed: dict[Agreement, AgreedPlanes] = {}
         self.names: dict[int, bool] = {}
         self.left: StoredPlan | None = None
         self.departed = self.away = self.contradicted = False
@@ -197,11 +200,17 @@ class Peer:
         self.settled = None
         self.contradicted = self.changed = True
 
-    def propose(self, now: int, one: Agreement) -> None:
-        """Take the agreement ``one``, which the peer has not stated."""
+    def agree(self, one: Agreement, planes: AgreedPlanes) -> None:
+        """Take the agreement ``one``, with its ``planes``."""
         self.pair.take(one)
-        self._proposed[one] = now
+        self.agreed = {other: known for other, known in self.agreed.items() if other in self.pair.kept}
+        self.agreed[one] = planes
         self.changed = True
+
+    def propose(self, now: int, one: Agreement, planes: AgreedPlanes) -> None:
+        """Take the agreement ``one``, which the peer has not stated, with its ``planes``."""
+        self.agree(one, planes)
+        self._proposed[one] = now
 
     def waiting(self, now: int) -> int | None:
         """Return the time (µs) since the newest unanswered proposal; None if each is answered."""

@@ -14,20 +14,14 @@ from mavlink_bridge.wire.plan import WirePlan, unpack
 
 _RECENT = 24
 """Number of plans of a sender that are kept without an agreement on them."""
-_SEGMENT = 72
-"""Size (bytes) of the control points of a segment."""
 
 
 class StoredPlan(NamedTuple):
-    """Plan with its control points (n, 3, 3), m; ``rested`` (3n, 3, 3): these and those of its rest.
-
-    ``data``: the memory of ``rested``.
-    """
+    """Plan with its control points (n, 3, 3), m; ``rested`` (3n, 3, 3): these and those of its rest."""
 
     plan: WirePlan
     controls: Array
     rested: Array
-    data: bytes
 
     def later(self, epoch: int, rows: int) -> Array:
         """Return ``rows`` ≤ 2n control points (rows, 3, 3), m, from ``epoch`` (µs) on.
@@ -37,18 +31,13 @@ class StoredPlan(NamedTuple):
         first = min((epoch - self.plan.epoch) // self.plan.dt, len(self.controls))
         return self.rested[first : first + rows]
 
-    def bytes_from(self, epoch: int, rows: int) -> bytes:
-        """Return the memory of ``later``, in a third of the time."""
-        first = _SEGMENT * min((epoch - self.plan.epoch) // self.plan.dt, len(self.controls))
-        return self.data[first : first + _SEGMENT * rows]
-
 
 def stored(plan: WirePlan) -> StoredPlan:
     """Return ``plan`` with its control points, which are read-only."""
     points = controls(plan)
     data = points.tobytes() + 6 * len(points) * points[-1, 2].tobytes()
     rested: Array = np.frombuffer(data).reshape(-1, 3, 3)
-    return StoredPlan(plan, rested[: len(points)], rested, data)
+    return StoredPlan(plan, rested[: len(points)], rested)
 
 
 @lru_cache(maxsize=512)

@@ -34,15 +34,19 @@ from companion.values.compiled import BOOL, FLOAT, VOID, array, kernel, output, 
 from companion.values.horizon import Array
 
 _TINY = 1e-12
+AGREED = 12
+"""Length of a row of ``agreed_planes``."""
 
 
 class Others(NamedTuple):
-    """M pairs of plans whose planes a plan keeps to.
+    """A agreements and M pairs of plans whose planes a plan keeps to.
 
     ``own`` and ``controls`` (M, n, 3, 3), m: control points of the own plan and of the other plan of each
     pair, on the committed plan's knots. ``distance`` (M, n), m: least distance on each segment. ``shares``
     (M,): whether the other side keeps half of it itself. ``heights`` (M,): 1/w, by which differences in
     height are multiplied; None: 1. ``boxes``: B boxes to keep ``from_boxes`` (m) from; None: none.
+    ``agreed`` (A, n + 1, 12), m: rows of ``agreed_planes`` from the beginning of the committed plan on, of
+    pairs whose other side keeps half of the distance itself; None: none.
     """
 
     own: Array
@@ -52,12 +56,13 @@ class Others(NamedTuple):
     heights: Array | None = None
     boxes: Boxes | None = None
     from_boxes: float = 0.0
+    agreed: Array | None = None
 
 
 class Planes(NamedTuple):
     """Normals c (M, n, 3), or S c where heights count less, and the least c·q of control points (M, n, 3).
 
-    Those of boxes come after those of the M pairs.
+    Those of agreements come first, then those of the M pairs, then those of boxes.
 
     ``least`` is what must hold; ``wanted`` is slightly more where the committed plan allows it, so that a
     rounded plan still keeps ``least``.
@@ -73,17 +78,32 @@ def planes(committed: Array, others: Others, spare: float, *, upright: bool = Fa
 
     ``spare`` (m) is wanted beyond the least distance. ``upright``: heights do not count.
     """
-    found = Planes(*np.empty((3, *others.distance.shape, 3)))
+    steps = len(committed)
+    agreed = np.empty((0, steps + 1, AGREED)) if others.agreed is None else others.agreed
+    found = Planes(*np.empty((3, len(agreed) + len(others.own), steps, 3)))
     # The kernel needs contiguous arrays; those of a flight are contiguous already.
     committed, own, controls, distance = map(
         np.ascontiguousarray, (committed, others.own, others.controls, others.distance)
     )
     heights = np.ones(len(own)) if others.heights is None else np.ascontiguousarray(others.heights)
-    _planes(committed, own, controls, distance, others.shares, heights, spare, upright, *found)
+    _planes(committed, agreed, own, controls, distance, others.shares, heights, spare, upright, *found)
     if others.boxes is None or not len(others.boxes.centres):
         return found
     of_boxes = box_planes(committed, others.boxes, others.from_boxes, spare, upright=upright)
     return Planes(*(np.concatenate(parts) for parts in zip(found, of_boxes, strict=True)))
+
+
+def agreed_planes(
+    own: Array, other: Array, distance: float, *, upright: bool = False, downwash: float = 1.0
+) -> Array:
+    """Return what the planes of a pair of plans are made of, a row (12,) for each segment, m.
+
+    ``own`` and ``other``: control points (k, 3, 3), m, on the same knots. A row has the normal S c; c·S own_i
+    for the three control points; c·S r_i − ``distance``; and where the other plan begins the segment.
+    """
+    found = np.empty((len(own), AGREED))
+    _agreed(np.ascontiguousarray(own), np.ascontiguousarray(other), distance, 1.0 / downwash, upright, found)
+    return found
 
 
 def keeps(
@@ -189,9 +209,68 @@ def _nearest_all(triangles: Array, normals: Array) -> None:
         _nearest(triangles[k], candidate, normals[k])
 
 
-@kernel(VOID, array(3), array(4), array(4), array(2), array(1, BOOL), array(1), FLOAT, BOOL, *[output(3)] * 3)
+@part
+def _gaps(
+    own: Array,
+    other: Array,
+    height: float,
+    upright: bool,
+    relative: Array,
+    candidate: Array,
+    c: Array,
+    gaps: Array,
+) -> None:
+    """Write the normal S c of a segment, and c·S r_i (3,), m; ``relative`` and ``candidate`` are scratch."""
+    for i in range(3):
+        for k in range(3):
+            relative[i, k] = own[i, k] - other[i, k]
+        relative[i, 2] *= height
+        if upright:
+            relative[i, 2] = 0.0
+    _nearest(relative, candidate, c)
+    for i in range(3):
+        gaps[i] = _dot(c, relative[i])
+    c[2] *= height
+
+
+@kernel(VOID, array(3), array(3), FLOAT, FLOAT, BOOL, output(2))
+def _agreed(own: Array, other: Array, distance: float, height: float, upright: bool, found: Array) -> None:
+    """Write the rows of ``agreed_planes``."""
+    relative, candidate = np.empty((3, 3)), np.empty(3)
+    for n in range(len(own)):
+        row = found[n]
+        c, gaps = row[:3], row[6:9]
+        _gaps(own[n], other[n], height, upright, relative, candidate, c, gaps)
+        for i in range(3):
+            row[3 + i] = _dot(c, own[n, i])
+            gaps[i] -= distance
+            row[9 + i] = other[n, 0, i]
+
+
+@part
+def _bounds(
+    normal: Array, here: float, gap: float, half: float, spare: float, point: Array
+) -> tuple[float, float]:
+    """Return the least c·q of a control point, and the one that is wanted; ``point``: the committed one."""
+    least = here - half * max(gap, 0.0)
+    spared = here - half * max(gap - spare, 0.0)
+    return least, max(least, min(spared, _dot(normal, point)))
+
+
+@kernel(
+    VOID,
+    *[array(3)] * 2,
+    *[array(4)] * 2,
+    array(2),
+    array(1, BOOL),
+    array(1),
+    FLOAT,
+    BOOL,
+    *[output(3)] * 3,
+)
 def _planes(
     committed: Array,
+    agreed: Array,
     own: Array,
     controls: Array,
     distance: Array,
@@ -204,27 +283,24 @@ def _planes(
     wanted: Array,
 ) -> None:
     """Write the planes of the module's docstring to the last three arrays."""
-    relative, candidate, gaps = np.empty((3, 3)), np.empty(3), np.empty(3)
-    for m in range(len(controls)):
-        half = 0.5 if shares[m] else 1.0
+    for m in range(len(agreed)):
         for n in range(len(committed)):
+            row, c = agreed[m, n], normals[m, n]
             for i in range(3):
-                for k in range(3):
-                    relative[i, k] = own[m, n, i, k] - controls[m, n, i, k]
-                relative[i, 2] *= heights[m]
-                if upright:
-                    relative[i, 2] = 0.0
+                c[i] = row[i]
+            for i in range(3):
+                least[m, n, i], wanted[m, n, i] = _bounds(
+                    c, row[3 + i], row[6 + i], 0.5, spare, committed[n, i]
+                )
+    relative, candidate, gaps = np.empty((3, 3)), np.empty(3), np.empty(3)
+    for k in range(len(controls)):
+        m, half = len(agreed) + k, 0.5 if shares[k] else 1.0
+        for n in range(len(committed)):
             c = normals[m, n]
-            _nearest(relative, candidate, c)
+            _gaps(own[k, n], controls[k, n], heights[k], upright, relative, candidate, c, gaps)
             for i in range(3):
-                gaps[i] = _dot(c, relative[i]) - distance[m, n]
-            c[2] *= heights[m]
-            for i in range(3):
-                here = _dot(c, own[m, n, i])
-                gap = gaps[i]
-                least[m, n, i] = here - half * max(gap, 0.0)
-                spared = here - half * max(gap - spare, 0.0)
-                wanted[m, n, i] = max(least[m, n, i], min(spared, _dot(c, committed[n, i])))
+                here, gap = _dot(c, own[k, n, i]), gaps[i] - distance[k, n]
+                least[m, n, i], wanted[m, n, i] = _bounds(c, here, gap, half, spare, committed[n, i])
 
 
 @kernel(BOOL, array(3), array(3), array(3))

@@ -16,10 +16,9 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified import columns
+from companion.avoidance.certified.agreed_planes import AgreedPlanes, made
 from companion.avoidance.certified.agreements import Agreements
-from companion.avoidance.certified.negotiation import AgreedPlans
 from companion.avoidance.certified.pair import Agreement, Pair
-from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.reservation import Reservation
 from companion.values.components import COMPONENT
 from mavlink_bridge.messages import CommandLong, Message, Source, Tunnel
@@ -290,7 +289,7 @@ def without_the_oldest_planes(patch: pytest.MonkeyPatch) -> None:
     """Of several agreements with a peer, plans keep only the newest."""
     agreed = Agreements.agreed
 
-    def newest(self: Agreements) -> list[AgreedPlans]:
+    def newest(self: Agreements) -> list[AgreedPlanes]:
         counts = [len(peer.pair.kept) for _, peer in sorted(self._peers.items())]
         whole = agreed(self)
         return [whole[end - 1] for count, end in zip(counts, accumulate(counts), strict=True) if count]
@@ -300,16 +299,15 @@ def without_the_oldest_planes(patch: pytest.MonkeyPatch) -> None:
 
 def against_stale_plans(patch: pytest.MonkeyPatch) -> None:
     """Planes are computed from a plan of the peer that is two epochs older."""
-    agreed = Agreements.agreed
 
-    def stale(self: Agreements) -> list[AgreedPlans]:
-        return [plans._replace(other=_older(self, plans.other)) for plans in agreed(self)]
-
-    def _older(self: Agreements, plan: StoredPlan) -> StoredPlan:
-        for peer in self._peers.values():
-            if peer.plans.get(plan.plan.epoch) is plan:
-                return peer.plans.get(plan.plan.epoch - 2 * self._config.epoch_us) or plan
-        return plan
+    def stale(self: Agreements) -> list[AgreedPlanes]:
+        negotiation, two = self._negotiation, 2 * self._config.epoch_us
+        kept = [(peer, one) for peer in self._peers.values() for one in peer.pair.kept]
+        pairs = [(peer, negotiation.plans_of(peer, one)) for peer, one in kept]
+        return [
+            made(own, peer.plans.get(other.plan.epoch - two) or other, negotiation._geometry.agreed)
+            for peer, (own, other) in pairs
+        ]
 
     patch.setattr(Agreements, "agreed", stale)
 

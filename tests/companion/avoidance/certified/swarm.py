@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.avoidance.certified.agreements import AgreedPlans
+from companion.avoidance.certified.agreed_planes import AgreedPlanes
 from companion.avoidance.certified.committed import carried_on, controls, horizon_of, resting
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.margins import between, further
@@ -250,7 +250,7 @@ class Vehicle:
         """Whether it may plan beside ``system`` because of an agreement."""
         return system in self.flight.agreements.members - self.flight.agreements.missing()
 
-    def keeps(self) -> list[tuple[int, Agreement, AgreedPlans]]:
+    def keeps(self) -> list[tuple[int, Agreement, AgreedPlanes]]:
         """The agreements that it keeps now, with whom, and what it takes for their plans."""
         agreements = self.flight.agreements
         named = [(system, one) for system, kept in sorted(agreements.kept().items()) for one in kept]

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from companion.avoidance.certified import constraint_sources
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.commitment import HoldReason
@@ -19,6 +18,7 @@ from companion.avoidance.certified.committed import resting
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.negotiation import Negotiation
 from companion.avoidance.certified.reservation import Reservation
+from companion.avoidance.certified.separating_planes import agreed_planes
 from companion.config import CompanionConfig
 from companion.values.components import COMPONENT
 from companion.values.horizon import Array, Motion
@@ -444,7 +444,11 @@ def climb_without_waiting(patch: pytest.MonkeyPatch) -> None:
 
 def ignore_the_column(patch: pytest.MonkeyPatch) -> None:
     """Planes near a column are in space."""
-    patch.setattr(constraint_sources, "levelled", lambda plan, own: plan)
+
+    def in_space(self: Distances, own: Array, other: Array, columns: int) -> Array:
+        return agreed_planes(own, other, self.least(columns))
+
+    patch.setattr(Distances, "agreed", in_space)
 
 
 def agree_nearer_than_allowed(patch: pytest.MonkeyPatch) -> None:

@@ -26,7 +26,7 @@ def drop_a_plane(patch: Patch) -> None:
 
     def without(self: ConstraintSources, *given: Any) -> tuple[Others, Array]:
         others, field = around(self, *given)
-        return Others(others.own[1:], others.controls[1:], others.distance[1:], others.shares[1:]), field
+        return others._replace(agreed=None if others.agreed is None else others.agreed[1:]), field
 
     patch.setattr(ConstraintSources, "around", without)
 

@@ -27,7 +27,7 @@ def agreements(own: int = OWN, *expected: int) -> Agreements:
         config,
         STEPS,
         FleetIdentity(FRAME, FRAME & 0xFF),
-        Geometry(DISTANCES.keeps, DISTANCES.apart),
+        Geometry(DISTANCES.keeps, DISTANCES.apart, DISTANCES.agreed),
     )
     one.begin(EPOCH)
     return one

@@ -1,0 +1,80 @@
+"""Planes of an agreement, which are computed once, are those of its two plans at every later epoch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.avoidance.certified.agreed_planes import made, stacked
+from companion.avoidance.certified.columns import Distances, levelled
+from companion.avoidance.certified.committed import controls
+from companion.avoidance.certified.deadlock import mean_velocities
+from companion.avoidance.certified.peer_plans import StoredPlan, stored
+from companion.avoidance.certified.separating_planes import Others, planes
+from tests.companion.avoidance.certified.plans import DT, STEPS, random_plan
+
+LENGTH = DT
+"""Length of an epoch, µs."""
+FURTHER = 0.25
+"""Distance (m) that each column adds."""
+
+
+def pair(seed: int, columns: tuple[bool, bool], later: int) -> tuple[StoredPlan, StoredPlan]:
+    """Two plans, of which the second begins ``later`` epochs after the first."""
+    rng = np.random.default_rng(seed)
+    own, other = random_plan(rng, np.zeros(3)), random_plan(rng, np.array([3.0, 0.5, 0.2]))
+    other = other._replace(epoch=own.epoch + later * LENGTH)
+    return stored(own._replace(column=columns[0])), stored(other._replace(column=columns[1]))
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.tuples(st.booleans(), st.booleans()),
+    st.integers(-3, 3),
+    st.integers(0, 2 * STEPS),
+    st.booleans(),
+    st.sampled_from([1.0, 2.0]),
+)
+def test_they_are_those_of_the_two_plans(
+    seed: int, columns: tuple[bool, bool], later: int, epochs: int, planar: bool, downwash: float
+) -> None:
+    """Bit by bit, also after both plans have ended; so are the velocities of the other plan."""
+    own, other = pair(seed, columns, later)
+    distances = Distances(1.5, FURTHER, STEPS, planar=planar, downwash=downwash)
+    begins = max(own.plan.epoch, other.plan.epoch) + epochs * LENGTH
+    committed = controls(random_plan(np.random.default_rng(seed + 1), np.zeros(3)))
+    one, two = own.later(begins, STEPS), other.later(begins, STEPS)
+    if any(columns):
+        two = levelled(two, one)
+    least, heights = np.full((1, STEPS), distances.least(sum(columns))), np.full(1, 1.0 / downwash)
+    whole = Others(one[None], two[None], least, np.ones(1, np.bool_), heights)
+    none = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, np.bool_), np.zeros(0))
+    agreed = none._replace(agreed=stacked([made(own, other, distances.agreed)], begins, STEPS))
+    expected = planes(committed, whole, 0.02, upright=planar)
+    found = planes(committed, agreed, 0.02, upright=planar)
+    for part, wanted in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(part, wanted)
+    velocities = (mean_velocities(others, 1.0, 2) for others in (agreed, whole))
+    np.testing.assert_array_equal(*velocities)
+
+
+def test_they_come_before_those_of_pairs_that_share_nothing() -> None:
+    own, other = pair(1, (False, False), 0)
+    distances = Distances(1.5, FURTHER, STEPS)
+    planes_of = made(own, other, distances.agreed)
+    ball = np.broadcast_to(np.array([9.0, 0.0, 0.0]), (STEPS, 3, 3))
+    begins = own.plan.epoch
+    committed = own.later(begins, STEPS)
+    both = Others(
+        committed[None],
+        ball[None],
+        np.full((1, STEPS), 1.0),
+        np.zeros(1, np.bool_),
+        agreed=stacked([planes_of, planes_of], begins, STEPS),
+    )
+    found = planes(committed, both, 0.0)
+    assert found.normals.shape == (3, STEPS, 3)
+    np.testing.assert_array_equal(found.normals[0], found.normals[1])
+    assert found.normals[2, 0] @ (1.0, 0.0, 0.0) == pytest.approx(-1.0, abs=1e-2)
