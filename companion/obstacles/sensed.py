@@ -5,6 +5,7 @@ They supplement the configured obstacles and the moving ones that report their o
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -67,7 +68,7 @@ class Sensed:
         Each obstacle is given by its points nearest to the predicted positions.
         """
         if self.proximity is None and self.traffic is None:
-            return Axes((), np.empty((0, len(prediction), 3)), np.empty(0))
+            return _nothing(len(prediction))
         parts = [
             part.around(now, prediction, reach) for part in (self.proximity, self.traffic) if part is not None
         ]
@@ -102,3 +103,9 @@ class Sensed:
             return goal
         field = self._config.field
         return self.traffic.outside(now, goal, here, field.d_safe + field.margin(1))
+
+
+@cache
+def _nothing(points: int) -> Axes:
+    """Return no obstacle, beside so many predicted positions."""
+    return Axes((), np.empty((0, points, 3)), np.empty(0))

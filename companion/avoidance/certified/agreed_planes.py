@@ -24,19 +24,14 @@ Rows = Callable[[Array, Array, int], Array]
 class AgreedPlanes(NamedTuple):
     """Planes of an agreement on the plans ``own`` and ``other``.
 
-    ``data``: the memory of 2n + 1 rows of ``separating_planes.agreed_planes``, for the segments from the
-    beginning of the later plan on; in the last n + 1 of them both plans rest.
+    ``data``: the memory of 2n + 1 rows of ``separating_planes.agreed_planes``, for the segments from
+    ``epoch`` (µs) on, when the later plan begins; in the last n + 1 of them both plans rest.
     """
 
     own: StoredPlan
     other: StoredPlan
+    epoch: int
     data: bytes
-
-    def later(self, epoch: int) -> bytes:
-        """Return the memory of n + 1 rows from ``epoch`` (µs) on: a knot, not before the later plan."""
-        own, steps = self.own.plan, len(self.own.controls)
-        first = min((epoch - max(own.epoch, self.other.plan.epoch)) // own.dt, steps)
-        return self.data[_ROW * first : _ROW * (first + steps + 1)]
 
 
 def made(own: StoredPlan, other: StoredPlan, rows: Rows) -> AgreedPlanes:
@@ -44,9 +39,16 @@ def made(own: StoredPlan, other: StoredPlan, rows: Rows) -> AgreedPlanes:
     epoch, steps = max(own.plan.epoch, other.plan.epoch), len(own.controls)
     columns = own.plan.column + other.plan.column
     found = rows(own.later(epoch, steps + 1), other.later(epoch, steps + 1), columns)
-    return AgreedPlanes(own, other, found.tobytes() + steps * found[-1].tobytes())
+    return AgreedPlanes(own, other, epoch, found.tobytes() + steps * found[-1].tobytes())
 
 
-def stacked(agreed: list[AgreedPlanes], epoch: int, steps: int) -> Array:
-    """Return the rows (A, n + 1, 12) of all ``agreed`` from ``epoch`` (µs) on; n: the ``steps`` of plans."""
-    return np.frombuffer(b"".join([one.later(epoch) for one in agreed])).reshape(-1, steps + 1, AGREED)
+def stacked(agreed: list[AgreedPlanes], epoch: int, dt: int, steps: int) -> Array:
+    """Return the rows (A, n + 1, 12) of all ``agreed`` from ``epoch`` (µs) on.
+
+    It is a knot, and no plan of ``agreed`` begins later. ``dt`` (µs) and ``steps`` n: of all plans.
+    """
+    size, found = _ROW * (steps + 1), []
+    for one in agreed:
+        first = _ROW * min((epoch - one.epoch) // dt, steps)
+        found.append(one.data[first : first + size])
+    return np.frombuffer(b"".join(found)).reshape(-1, steps + 1, AGREED)

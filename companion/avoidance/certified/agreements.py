@@ -258,7 +258,8 @@ class Agreements:
 
         They stay there, and may be silent when this vehicle comes.
         """
-        return {peer.pair.peer: peer.left for peer in self._everybody() if peer.left is not None}
+        known = [*self._peers.values(), *self._distant.values()]
+        return {peer.pair.peer: peer.left for peer in known if peer.left is not None}
 
     @property
     def distant(self) -> dict[int, int]:
@@ -275,7 +276,7 @@ class Agreements:
     @property
     def away(self) -> frozenset[int]:
         """Members whose vehicle another controller flies, which need not keep the agreements."""
-        return frozenset(system for system, peer in self._peers.items() if peer.away and peer.left is None)
+        return frozenset([system for system, peer in self._peers.items() if peer.away and peer.left is None])
 
     def resting(self, since: int, within: float) -> dict[int, Array]:
         """Return where the newest plan of each peer ends (3,), m, whose plan of ``since`` (µs) was there.

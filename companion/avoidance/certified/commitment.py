@@ -303,7 +303,8 @@ class Commitment:
         """Return the acceleration (3,), m/s², with which this epoch ends."""
         if self.current is None:
             return np.zeros(3)
-        return 1e-3 * np.array(self.current.accelerations[self._config.knots - 1], dtype=np.float64)
+        x, y, z = self.current.accelerations[self._config.knots - 1]
+        return np.array((1e-3 * x, 1e-3 * y, 1e-3 * z))
 
     def _carried(self) -> tuple[WirePlan, Array, Array]:
         """Return the committed plan from the next epoch on, with its control points and accelerations."""

@@ -5,6 +5,7 @@ All are given on the plan's own knots.
 
 from __future__ import annotations
 
+from collections.abc import Set
 from math import hypot, sqrt
 
 import numpy as np
@@ -80,9 +81,13 @@ class ConstraintSources:
         # its last plan may be flown by another controller, at any height: it counts as non-cooperative while
         # it sends. Once it is silent it counts as landed at its last position, as it may be switched off.
         taken_over = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
-        members = agreements.members.union(left.keys() - taken_over) - agreements.away
+        members: Set[int] = agreements.members
+        if left:
+            members = members | (left.keys() - taken_over)
+        if away := agreements.away:
+            members = members - away
         if distant := agreements.distant:
-            members |= self._beyond_range(distant, world)
+            members = members | self._beyond_range(distant, world)
         seen = self._noncooperative.seen(begins, members, world)
         strangers = self._noncooperative.balls(seen, own)
         noncooperative = [*strangers, *self._noncooperative.target(now, begins, view)]
@@ -103,7 +108,7 @@ class ConstraintSources:
             *self._unshared(own, unshared, vehicles),
             self._boxes_near(own),
             self._from_surfaces,
-            stacked(agreements.agreed(), begins, self._steps),
+            stacked(agreements.agreed(), begins, self._config.certified.dt_us, self._steps),
         )
         return others, self._noncooperative.field(seen, own, sensed)
 

@@ -71,9 +71,10 @@ class DeadlockTurn:
         if angle == 0.0:
             return goal
         offset = goal - position
-        length = sqrt(offset @ offset)
-        if angle > self._config.bend and length > self._config.detour:
-            offset = offset * (self._config.detour / length)
+        if angle > self._config.bend:
+            length = sqrt(offset @ offset)
+            if length > self._config.detour:
+                offset = offset * (self._config.detour / length)
         return position + turned(offset, -self._sense * angle)
 
     @property

@@ -401,7 +401,7 @@ class CertifiedFlight:
         )
         if (detour.begun, 0 if way is None else way.begun) != begun:
             self._deadlock_turn.restart()
-        return subgoal._replace(beyond=subgoal.beyond + goal.beyond)
+        return Subgoal(subgoal.place, subgoal.beyond + goal.beyond)
 
     def _met(self, now: int, start: WirePlan, goal: Array) -> Anticipated:
         """Return how to avoid encounters on the way from the ``start`` of the plan to ``goal`` (3,), m.

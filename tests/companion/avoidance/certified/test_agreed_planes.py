@@ -51,7 +51,7 @@ def test_they_are_those_of_the_two_plans(
     least, heights = np.full((1, STEPS), distances.least(sum(columns))), np.full(1, 1.0 / downwash)
     whole = Others(one[None], two[None], least, np.ones(1, np.bool_), heights)
     none = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, np.bool_), np.zeros(0))
-    agreed = none._replace(agreed=stacked([made(own, other, distances.agreed)], begins, STEPS))
+    agreed = none._replace(agreed=stacked([made(own, other, distances.agreed)], begins, DT, STEPS))
     expected = planes(committed, whole, 0.02, upright=planar)
     found = planes(committed, agreed, 0.02, upright=planar)
     for part, wanted in zip(found, expected, strict=True):
@@ -72,7 +72,7 @@ def test_they_come_before_those_of_pairs_that_share_nothing() -> None:
         ball[None],
         np.full((1, STEPS), 1.0),
         np.zeros(1, np.bool_),
-        agreed=stacked([planes_of, planes_of], begins, STEPS),
+        agreed=stacked([planes_of, planes_of], begins, DT, STEPS),
     )
     found = planes(committed, both, 0.0)
     assert found.normals.shape == (3, STEPS, 3)
