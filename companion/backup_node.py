@@ -11,8 +11,9 @@ companion that returns continues the same plan.
 The backup node continues only a plan that is known to be flown: the companion's last set-point must agree
 with the plan that the backup node holds, by its own clock and in its own local frame. A column is continued
 at the height of that set-point, and only the horizontal distance counts, unless its plan still moves
-vertically. Before the first plan of a companion begins, that plan counts if it never moves. The backup node
-must start before the companion steers; otherwise it waits for the next plan. It adds to the plan what the
+vertically. Before any stored plan has begun, the earliest one counts if it never moves, and if a set-point
+after its announcement agrees with its place. The backup node must start before the companion steers;
+otherwise it waits for the next plan that has begun, or that never moves. It adds to the plan what the
 companion adds (``plan_feedforward``, ``sent_compensation``). The companion's command to land, its farewell,
 another mode, a disarmed vehicle or three seconds without a heartbeat discard all plans.
 """
@@ -215,7 +216,7 @@ class BackupNode:
             case Tunnel():
                 self._store(now, message)
             case _:
-                pass
+                self._additions.forget()
 
     def _store(self, now: int, message: Tunnel) -> None:
         """Store a plan of the companion; discard all plans on a farewell, after which the companion lands."""
@@ -225,8 +226,9 @@ class BackupNode:
                 self._last_word.receive(statement)
                 if statement.farewell and not self._finishes:
                     self._forget()
-            elif message.payload_type == PLAN:
-                self._plans.add(now, unpack_plan(message.payload))
+            elif message.payload_type == PLAN and self._plans.add(now, unpack_plan(message.payload)):
+                # What was observed rests on another plan at that time.
+                self._additions.forget()
         except PlanWireError:
             return
 

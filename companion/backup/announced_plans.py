@@ -29,16 +29,21 @@ class AnnouncedPlans:
         """Return whether ``plan`` is in the fleet's frame, and of about ``now`` (µs)."""
         return plan.origin == self._origin and abs(plan.epoch - now) <= _MAX_EPOCHS_AWAY * self._epoch_us
 
-    def add(self, now: int, plan: WirePlan) -> None:
-        """Store ``plan``, received at ``now`` (µs), if it fits and ends at rest."""
+    def add(self, now: int, plan: WirePlan) -> bool:
+        """Store ``plan``, received at ``now`` (µs), if it fits and ends at rest.
+
+        Returns whether it is earlier than all stored plans, so that it changes ``horizon`` at earlier times.
+        """
         if not self.fits(now, plan) or not rests(plan):
-            return
+            return False
+        earlier = bool(self._plans) and plan.epoch < min(self._plans)
         self._plans[plan.epoch] = plan
         # Keep the plan that was flown before the longest pause over which the feed-forward goes on, and those
         # after it.
         begun = [epoch for epoch in self._plans if epoch <= now - MAX_PAUSE_US]
         oldest = max(begun, default=min(self._plans))
         self._plans = {epoch: kept for epoch, kept in self._plans.items() if epoch >= oldest}
+        return earlier
 
     def clear(self) -> None:
         """Discard all plans."""
@@ -52,8 +57,10 @@ class AnnouncedPlans:
     def horizon(self, now: int) -> Horizon | None:
         """Return the committed plan at ``now`` (µs): the newest that has begun; None without one.
 
-        Before any has begun that is the first one, if it never moves: its companion holds the place of its
-        first plan from the announcement on. A column whose plan has no vertical motion is at ``height``.
+        Before any has begun that is the first one, if it never moves: a companion that begins holds the place
+        of its first plan from the announcement on. If plans of before were not received, or were discarded,
+        the vehicle may still fly one that ends there; a set-point that agrees is ``AGREES_M`` from the place
+        at most. A column whose plan has no vertical motion is at ``height``.
         """
         plan = self._flown(now)
         if plan is None:

@@ -113,11 +113,10 @@ class Bench:
     def _spoken(self) -> SetpointLocal:
         """What the companion sends: its plan, by its own clock."""
         now = self.now + self.ahead
-        plan = max(
-            (p for p in self.plans if p.epoch <= now),
-            default=[*self.plans, plan_from(BEGIN)][0],
-            key=lambda p: p.epoch,
-        )
+        begun = [plan for plan in self.plans if plan.epoch <= now]
+        # Before its first plan begins it holds the place where that begins; without a plan it flies another.
+        first = self.plans[0] if self.plans else plan_from(BEGIN)
+        plan = max(begun, default=first, key=lambda one: one.epoch)
         place = horizon_of(plan).at(now + CONFIG.setpoint_lead_us).position
         place[0] += self.east
         if self.height is not None:
@@ -541,3 +540,20 @@ def test_a_pause_of_the_companion_across_epochs_ends_nothing() -> None:
     bench.now += TICK
     bench.speaks = True
     assert bench.run(1.0) == []
+
+
+@pytest.mark.parametrize("profile", [ARDUPILOT, PX4], ids=lambda profile: profile.name)
+def test_an_earlier_plan_that_arrives_later_ends_what_was_observed_before_it(profile: Profile) -> None:
+    """A plan at rest was held before it began; then one arrives that begins sooner, and moves."""
+    bench = Compensating(profile)
+    rest = resting(BEGIN + 600_000, DT, STEPS, (1.0, 2.0, 5.0), FLEET.fingerprint)
+    bench.plans = [rest]
+    assert bench.run(0.26) == []
+    moving = committed(rest._replace(epoch=BEGIN + 400_000), np.full((STEPS, 3), 0.2))
+    bench.node.step(bench.now, [bench.tell("swarm", told(moving))])
+    bench.speaks = False
+    sent = bench.run(0.3)
+    assert sent[0][0] == BEGIN + 400_000
+    for time, message in sent:
+        place = horizon_of(moving).at(time + CONFIG.setpoint_lead_us).position
+        np.testing.assert_allclose(enu_to_ned(place), message.position, atol=1e-3)

@@ -138,7 +138,7 @@ class SeparationQp:
         # Memory of ``active_set``, and its parts that are the QP in its dual form, by the number that binds.
         most = _MOST_BINDING
         self._active, self._images = np.zeros(most, np.int64), np.zeros((most, 3, n))
-        self._memory = _memory(0, n)
+        self._memory = _room_for(0, n)
         self._gram, self._missing = np.zeros(most * most), np.zeros(most)
         self._duals = [
             (self._gram[: size * size].reshape(size, size).T, self._missing[:size])
@@ -164,7 +164,7 @@ class SeparationQp:
         the QP holds them.
         """
         if len(self._memory.whose) < planes.wanted.size:
-            self._memory = _memory(planes.wanted.size, self.n)
+            self._memory = _room_for(planes.wanted.size, self.n)
         c, start, of, normals, low, a_min, a_max, whose = self._memory
         places, velocities, field = map(np.ascontiguousarray, objective[:3])
         known: Any = *state[:3], places, velocities, field, *self._cost_parts[objective.moving], c, start
@@ -253,7 +253,7 @@ class _Memory(NamedTuple):
     whose: NDArray[np.int64]
 
 
-def _memory(planes: int, n: int) -> _Memory:
+def _room_for(planes: int, n: int) -> _Memory:
     """Return memory for a problem of ``n`` steps with up to ``planes`` rows of planes."""
     rows = _LIMITS * n + planes
     c, start, a_min, a_max = np.empty((4, 3, n))
