@@ -32,6 +32,13 @@ from companion.values.horizon import Array, Motion
 
 USUAL_DRAG = 0.25
 """1/s: drag per speed of a multirotor before it is estimated; most have 0.15 to 0.4."""
+LARGEST_DRAG = 0.5
+"""1/s: largest drag per speed for which δ is computed.
+
+A late response looks like drag while a vehicle accelerates. With the drag that was estimated then (up to 2
+1/s) δ grew, so that the trajectory fell behind further: with 0.13 s of delay a vehicle flew 1.4 m past its
+plan. More drag than this is left to the integral of the autopilot.
+"""
 _PERIOD_US = 20_000
 """Longest step (µs) in which δ is advanced."""
 MAX_PAUSE_US = 500_000
@@ -93,7 +100,7 @@ class PlanFeedforward:
         """Advance δ from ``time`` by ``step`` (µs)."""
         self._last, dt = time + step, 1e-6 * step
         here, later = plan(self._last), plan(self._last + inverse.lag_us)
-        needed = (later.acceleration - here.acceleration + drag * later.velocity)[:2]
+        needed = (later.acceleration - here.acceleration + min(drag, LARGEST_DRAG) * later.velocity)[:2]
         offset, speed, total, change = self._state
         moved = offset + dt * (speed + 0.5 * dt * change)
         offset = np.minimum(np.maximum(moved, -MAX_OFFSET_M), MAX_OFFSET_M)
