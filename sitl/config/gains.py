@@ -31,6 +31,10 @@ class ArduPilotGains(BaseModel):
     acceleration_z: Positive = Field(1.0, description="WPNAV_ACCEL_Z, m/s²: of corrections")
     position_z: Positive = Field(1.0, description="PSC_POSZ_P, 1/s")
     velocity_z: Positive = Field(5.0, description="PSC_VELZ_P, 1/s")
+    filter_z_hz: Positive = Field(5.0, description="PSC_VELZ_FLTE, Hz")
+    throttle: Positive = Field(0.5, description="PSC_ACCZ_P, thousandths of the throttle per cm/s²")
+    throttle_integral: Share = Field(1.0, description="PSC_ACCZ_I, the same per s")
+    throttle_filter_hz: Positive = Field(20.0, description="PSC_ACCZ_FLTE, Hz")
 
 
 class Speeds(NamedTuple):

@@ -138,6 +138,16 @@ def test_the_emulation_is_where_each_vehicle_of_a_swarm_was(
     assert found.worst <= 0.75
 
 
+def test_on_plans_that_change_height_the_emulation_is_within_a_decimetre() -> None:
+    """Committed plans with vertical accelerations of 1 m/s². The vehicles fly on their estimate, so that is
+    what they are compared with."""
+    for vehicle in read_swarm(FLIGHTS / "arducopter-3-certified.npz"):
+        found = follow(vehicle._replace(truth=vehicle.estimate))
+        off = np.abs(found.places - found.truth)
+        assert np.percentile(found.errors, 95.0) <= 0.10
+        assert np.percentile(off[:, 2], 95.0) <= 0.04
+
+
 @pytest.mark.parametrize("name", SWARMS)
 def test_pairs_come_as_near_as_they_did(swarms: dict[str, Swarm], name: str) -> None:
     """Each flies its own recorded set-points alone, so the sum of two errors counts."""

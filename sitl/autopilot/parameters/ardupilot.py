@@ -59,6 +59,8 @@ BOUND: Final = {
     "PSC_JERK_Z": Bound("ardupilot.jerk_z"),
     "PSC_POSZ_P": Bound("ardupilot.position_z"),
     "PSC_VELZ_P": Bound("ardupilot.velocity_z"),
+    "PSC_ACCZ_P": Bound("ardupilot.throttle"),
+    "PSC_ACCZ_I": Bound("ardupilot.throttle_integral"),
     "WPNAV_ACCEL": Bound("ardupilot.acceleration", 0.01),
     "WPNAV_ACCEL_Z": Bound("ardupilot.acceleration_z", 0.01),
     "ANGLE_MAX": Bound("ardupilot.tilt", 0.01 * _DEGREE),

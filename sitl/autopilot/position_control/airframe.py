@@ -1,7 +1,9 @@
 """Airframe of a firmware's simulator as a point mass, with lag of tilt and thrust, and drag.
 
-Both simulators fly a quadrotor whose horizontal acceleration is g·tan(tilt) less drag. The attitude loop is
-modelled as a second-order lag on each tilt angle; yaw has no effect on a point mass.
+Both firmwares tilt for a wanted acceleration as in hover, by atan(a/g), and keep the vertical part of the
+thrust at the throttle's. So the horizontal acceleration, less drag, is the vertical part of the thrust times
+tan(tilt): less than wanted while the vehicle accelerates downwards, and more while it does upwards. The
+attitude loop is modelled as a second-order lag on each tilt angle; yaw has no effect on a point mass.
 """
 
 from __future__ import annotations
@@ -41,6 +43,7 @@ ARDUPILOT: Final = Airframe(
     angle_rate=1.0 / 0.15,
     angle_acceleration=math.radians(1100.0),
     angle_lag=0.04,
+    # The throttle's filter of 2 Hz.
     thrust_lag=0.08,
     # The 3 kg quadrotor of ArduPilot's SITL: momentum drag of four rotors at hover thrust, 0.74 N per m/s,
     # and 0.10 N per (m/s)².
@@ -98,10 +101,12 @@ class PointMass:
         )
         north, east, down = (v - w for v, w in zip(self.velocity, wind, strict=True))
         drag, square = frame.drag, frame.square_drag
+        # Rotors do not push downwards.
+        lift = max(GRAVITY - self._vertical_acceleration, 0.0)
         self._integrate(
             (
-                GRAVITY * math.tan(self._tilt[0]) - (drag + square * abs(north)) * north,
-                GRAVITY * math.tan(self._tilt[1]) - (drag + square * abs(east)) * east,
+                lift * math.tan(self._tilt[0]) - (drag + square * abs(north)) * north,
+                lift * math.tan(self._tilt[1]) - (drag + square * abs(east)) * east,
                 self._vertical_acceleration - (drag * down if frame.vertical_drag else 0.0),
             ),
             dt,

@@ -7,6 +7,7 @@ from typing import Self
 
 from mavlink_bridge.messages import Vector
 from sitl.autopilot.position_control.airframe import ARDUPILOT, GRAVITY, Motion, PointMass
+from sitl.autopilot.position_control.ardupilot_height import HeightControl
 from sitl.autopilot.position_control.ardupilot_shaping import Shaping
 from sitl.autopilot.position_control.square_root import (
     Pair,
@@ -16,7 +17,6 @@ from sitl.autopilot.position_control.square_root import (
     joined,
     same_way,
     split,
-    square_root_law,
 )
 from sitl.config.autopilot import AutopilotConfig
 from sitl.config.gains import ArduPilotGains, Speeds
@@ -35,6 +35,7 @@ class ArduPilotResponse:
         self._speeds = speeds
         self._mass = PointMass(ARDUPILOT)
         self._shaping = Shaping(gains, speeds)
+        self._height = HeightControl(gains, speeds)
         self.restart(ZERO)
 
     @classmethod
@@ -47,6 +48,7 @@ class ArduPilotResponse:
         self._gains = config.ardupilot
         self._speeds = _speeds(config)
         self._shaping.configure(self._gains, self._speeds)
+        self._height.configure(self._gains, self._speeds)
 
     @property
     def motion(self) -> Motion:
@@ -61,8 +63,9 @@ class ArduPilotResponse:
         return shaping.position, shaping.velocity, shaping.acceleration
 
     def restart(self, position: Vector) -> None:
-        """Rest at ``position``, with the integral reset."""
+        """Rest at ``position``, with the integrals reset."""
         self._mass.restart(position)
+        self._height.restart()
         self._shaping.restart(position, ZERO, ZERO)
         self._commanded: Vector = ZERO
         self._error: Pair = (0.0, 0.0)
@@ -91,7 +94,10 @@ class ArduPilotResponse:
         velocity_error = (0.0, 0.0) if self._velocity_error is None else self._velocity_error
         self._shaping.advance(wanted, dt, self._limited, self._error, velocity_error)
         north, east = self._horizontal(dt)
-        self._commanded = (north, east, self._vertical())
+        mass = self._mass
+        (_, _, z), (_, _, w), (_, _, c) = self.desired
+        down = self._height.advance((z, w, c), (mass.position[2], mass.velocity[2], mass.acceleration[2]), dt)
+        self._commanded = (north, east, down)
 
     def _horizontal(self, dt: float) -> Pair:
         gains, mass, shaping = self._gains, self._mass, self._shaping
@@ -163,14 +169,6 @@ class ArduPilotResponse:
         across = cut(across, limit)
         room = math.sqrt(max(limit * limit - across[0] ** 2 - across[1] ** 2, 0.0))
         return joined(max(-room, min(room, along)), across, direction)
-
-    def _vertical(self) -> float:
-        gains, speeds, mass, shaping = self._gains, self._speeds, self._mass, self._shaping
-        error = shaping.position[2] - mass.position[2]
-        closing = square_root_law(error, gains.position_z, gains.acceleration_z)
-        closing = max(-speeds.up, min(speeds.down, closing))
-        velocity_error = closing + shaping.velocity[2] - mass.velocity[2]
-        return gains.velocity_z * velocity_error + shaping.acceleration[2]
 
 
 def _speeds(config: AutopilotConfig) -> Speeds:
