@@ -26,6 +26,7 @@ from trials.autopilots import add_option, autopilots
 from trials.certified_flight import CertifiedFlight
 from trials.certified_plan import KINDS, PROCESSES, SIGMA, TUBE, CertifiedPlan
 from trials.certified_tracking import certified_tracking, logs_of
+from trials.pace import Pace, pace_of
 from trials.separation import blind, longest_gap, nearest, save
 
 GOES_ON_M: Final = 3.0
@@ -85,6 +86,7 @@ def flown(plan: CertifiedPlan, directory: Path) -> dict[str, Any]:
             ).document
             for system in plan.systems
         },
+        "pace": {system: pace.document for system in plan.systems if (pace := _pace(directory, system))},
         "reached": flight.reached,
         "others_moved_m": moved,
         "certify": certified,
@@ -92,6 +94,10 @@ def flown(plan: CertifiedPlan, directory: Path) -> dict[str, Any]:
     }
     (directory / "trial.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return document
+
+
+def _pace(directory: Path, system: int) -> Pace | None:
+    return pace_of(logs_of(directory, system), system)
 
 
 def planned(asked: argparse.Namespace) -> list[CertifiedPlan]:
