@@ -18,6 +18,10 @@ HOVER_THROTTLE: Final = 0.364
 """Throttle at which the 3 kg quadrotor of ArduPilot's SITL hovers, as its logs tell (CTUN.ThO)."""
 _PER_THROTTLE: Final = GRAVITY / HOVER_THROTTLE
 """Acceleration (m/s²) per throttle: AP_Motors makes the thrust proportional to it."""
+_HIGHEST: Final = _PER_THROTTLE - GRAVITY
+"""Upward acceleration (m/s²) at full throttle; without throttle it is −g."""
+_INTEGRAL_MAX: Final = 0.8 * _PER_THROTTLE
+"""m/s²: PSC_ACCZ_IMX, 800 thousandths of the throttle."""
 _PSC: Final = 0.1
 """Throttle per m/s², for a gain of 1: PSC_ACCZ_P and PSC_ACCZ_I count thousandths per cm/s²."""
 
@@ -59,8 +63,9 @@ class HeightControl:
         error = gains.velocity_z * velocity_error + desired[2] - actual[2]
         self._acceleration_error += _gain(gains.throttle_filter_hz, dt) * (error - self._acceleration_error)
         error = _PSC * _PER_THROTTLE * self._acceleration_error
-        self._integral += gains.throttle_integral * error * dt
-        return gains.throttle * error + self._integral
+        integral = self._integral + gains.throttle_integral * error * dt
+        self._integral = max(-_INTEGRAL_MAX, min(_INTEGRAL_MAX, integral))
+        return max(-_HIGHEST, min(GRAVITY, gains.throttle * error + self._integral))
 
 
 def _gain(hz: float, dt: float) -> float:

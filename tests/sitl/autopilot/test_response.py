@@ -382,6 +382,19 @@ def test_the_throttle_gives_a_part_of_an_acceleration_at_once_and_the_rest_by_it
     assert pushes[1] == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.parametrize("metres", [-500.0, 500.0])
+@pytest.mark.parametrize("gains", [{}, {"throttle": 1000.0, "throttle_integral": 1000.0}])
+def test_no_gain_of_the_throttle_gives_more_than_full_thrust_or_less_than_none(
+    gains: dict[str, float], metres: float
+) -> None:
+    response = made("ardupilot", ardupilot={"jerk_z": 100.0, "velocity_z": 50.0, **gains})
+    response.restart(HOVER)
+    for _ in range(1000):
+        response.advance(motion((0.0, 0.0, metres), (0.0, 0.0, metres), (0.0, 0.0, metres)), DT)
+        assert GRAVITY - GRAVITY / HOVER_THROTTLE - 1e-9 <= response.motion[2][2] <= GRAVITY + 1e-9
+    assert np.isfinite(response.motion).all()
+
+
 # PX4's limits
 
 
