@@ -5,14 +5,19 @@ next steps of all on a lattice (``giving_way.py``), from where the newest plans 
 all tell. If it meets another one within these steps, it aims along its own ones: ahead, aside, or back. The
 smaller id has priority, before all that have been at their goals. Vehicles that have received other things
 may expect other steps; that costs time, and no distance: sub-goals change only the cost of plans.
+
+Goals are beside the lattice's places. A vehicle that stands at its goal may be nearer to another place than
+two vehicles can be, although its own place is not. So it stands at its place while another one comes there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import hypot
 
 import numpy as np
 
+from companion.values.horizon import Array
 from companion.ways.clearance import Clearance
 from companion.ways.giving_way import Lengths, step
 from companion.ways.lattice import Lattice
@@ -21,22 +26,27 @@ from companion.ways.traveller import Traveller
 
 _STEPS = 8
 """Number of steps that are looked ahead."""
+_SEEN = 0.9
+"""Share of the clearance that plans keep with which places are seen: a plan slides round an edge."""
+_ROUNDING_M = 1e-6
 
 
 class Lanes:
     """Lanes among the obstacles of ``clear``, for a vehicle that keeps a ``clearance`` (m).
 
-    ``apart`` (m): distance of the places at which vehicles stand beside each other.
+    ``apart`` (m): distance of the places at which vehicles stand beside each other. ``kept`` (m): clearance
+    that plans keep; others push vehicles out of the lines between places, but not nearer to obstacles.
     """
 
-    def __init__(self, clear: Clearance, clearance: float, apart: float) -> None:
-        self._clear, self._clearance = clear, clearance
+    def __init__(self, clear: Clearance, clearance: float, apart: float, kept: float) -> None:
+        self._clear, self._seen = clear, _SEEN * kept
         self._lattice = Lattice(clear, clearance, apart)
 
     def subgoal(self, own: int, travellers: Mapping[int, Traveller]) -> Subgoal | None:
         """Return where the vehicle ``own`` among ``travellers``, by id, aims for; None where it meets none.
 
-        It meets another one if that is on its way within the next steps, or keeps it from its way.
+        It meets another one if that is on its way within the next steps, keeps it from its way, or comes near
+        its goal while it stands there.
         """
         systems = sorted(travellers)
         at = self._places(systems, travellers)
@@ -48,11 +58,21 @@ class Lanes:
         if int(lengths[me][at[me]]) >= len(self._lattice.places):
             return None
         reached = [travellers[one].reached for one in systems]
-        path = self._path(me, at, goals, reached, lengths)
+        paths = self._paths(at, goals, reached, lengths)
+        path = [step[me] for step in paths]
         others = {place for one, place in enumerate(at) if one != me}
-        if path == self._alone(at[me], lengths[me]) and not others.intersection(path):
+        hinders = goals[me] in path and self._hinders(
+            me, paths, goals, [travellers[one].goal for one in systems]
+        )
+        if not hinders and path == self._alone(at[me], lengths[me]) and not others.intersection(path):
             return None
-        return self._along(path, others, travellers[own], goals[me], lengths[me])
+        goal = None if hinders else goals[me]
+        return self._along(path, others, travellers[own], goal, lengths[me])
+
+    def has_been_at(self, rest: Array, goal: Array, within: float) -> bool:
+        """Return whether ``rest`` (3,), m, is ``within`` (m) of the place of ``goal`` (3,), m."""
+        node = self._lattice.nearest(goal)
+        return node >= 0 and float(np.abs(self._lattice.places[node] - rest)[:2].max()) < within
 
     def _places(self, systems: list[int], travellers: Mapping[int, Traveller]) -> list[int]:
         """Return the places at which the plans of ``systems`` end, a different one for each; −1 for none.
@@ -70,11 +90,11 @@ class Lanes:
             taken.add(found[one])
         return [found[one] for one in systems]
 
-    def _path(
-        self, me: int, at: list[int], goals: list[int], reached: list[bool], lengths: list[Lengths]
-    ) -> list[int]:
-        """Return the places of the vehicle ``me`` now and after each step of all."""
-        path = [at[me]]
+    def _paths(
+        self, at: list[int], goals: list[int], reached: list[bool], lengths: list[Lengths]
+    ) -> list[list[int]]:
+        """Return the places of all vehicles now and after each step."""
+        paths = [at]
         for _ in range(_STEPS):
             there = [place == goal for place, goal in zip(at, goals, strict=True)]
             reached = [one or now for one, now in zip(reached, there, strict=True)]
@@ -82,8 +102,24 @@ class Lanes:
                 range(len(at)), key=[*zip(reached, there, range(len(at)), strict=True)].__getitem__
             )
             at = step(at, order, lengths, self._lattice.beside)
-            path.append(at[me])
-        return path
+            paths.append(at)
+        return paths
+
+    def _hinders(self, me: int, paths: list[list[int]], goals: list[int], aims: list[Array]) -> bool:
+        """Return whether another one comes nearer to the goal of ``me`` than two vehicles stand apart.
+
+        ``aims`` (3,), m: the goals; others that stand at the places of their ``goals`` stand at them.
+        """
+        lattice = self._lattice
+        for places in paths:
+            for one, place in enumerate(places):
+                if one == me:
+                    continue
+                stands = aims[one] if place == goals[one] else lattice.places[place]
+                x, y = (stands - aims[me])[:2].tolist()
+                if hypot(x, y) < lattice.apart - _ROUNDING_M:
+                    return True
+        return False
 
     def _alone(self, place: int, lengths: Lengths) -> list[int]:
         """Return the places now and after each step of a vehicle that meets none."""
@@ -94,9 +130,9 @@ class Lanes:
         return path
 
     def _along(
-        self, path: list[int], others: set[int], own: Traveller, goal: int, lengths: Lengths
+        self, path: list[int], others: set[int], own: Traveller, goal: int | None, lengths: Lengths
     ) -> Subgoal:
-        """Return the furthest place of the ``path`` that is seen from the end of the plan.
+        """Return the furthest place of the ``path`` that is seen from the end of the plan; at ``goal`` that.
 
         The path counts up to where it waits or turns back, or where one of the ``others`` is now: beside a
         vehicle that is to leave a place across the own way, one that presses into it would keep it there.
@@ -105,11 +141,11 @@ class Lanes:
         for index, node in enumerate(path[1:], 1):
             if node in path[:index] or node in others:
                 break
-            if not self._clear.sees(own.rest, places[node], self._clearance):
+            if not self._clear.sees(own.rest, places[node], self._seen):
                 break
             chosen = node
         place = places[chosen].copy()
-        if chosen == goal and self._clear.sees(own.rest, own.goal, self._clearance):
+        if chosen == goal and self._clear.sees(own.rest, own.goal, self._seen):
             place = own.goal.copy()
         place[2] = own.goal[2]
         return Subgoal(place, self._lattice.apart * float(lengths[chosen]))

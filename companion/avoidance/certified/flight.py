@@ -77,7 +77,7 @@ class CertifiedFlight:
         self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
         least = from_surfaces(certified, config.field, config.limits) + BESIDE_M
-        self._way = way_of(config, least, _EFFORT)
+        self._way = way_of(config, least, _EFFORT, BESIDE_M)
         between = self._sources.between
         speed = min(config.limits.v_max[:2])
         self._anticipation = Anticipation(certified.anticipation, between, speed, sense)

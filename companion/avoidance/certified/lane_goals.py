@@ -48,9 +48,11 @@ class LaneGoals:
         if self._goal is None or float(np.abs(self._goal - destination).max()) > _REACHED_M:
             self._reached = False
         self._goal = destination
-        self._reached |= float(np.abs(rest - destination).max()) < _REACHED_M
-        self._goals.tell(destination, reached=self._reached)
         lanes = None if self._way is None else self._way.lanes()
+        self._reached |= float(np.abs(rest - destination).max()) < _REACHED_M or (
+            lanes is not None and lanes.has_been_at(rest, destination, _REACHED_M)
+        )
+        self._goals.tell(destination, reached=self._reached)
         if lanes is None:
             return None
         travellers = {}

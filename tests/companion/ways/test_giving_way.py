@@ -5,14 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from companion.avoidance.certified.lane_goals import LaneGoals
+from companion.avoidance.certified.told_goals import ToldGoals
 from companion.config.obstacles import Box
 from companion.config.planning import LimitsConfig
+from companion.config.way import WayConfig
 from companion.ways.clearance import Clearance
 from companion.ways.giving_way import step
 from companion.ways.grid import grid
 from companion.ways.lanes import Lanes
 from companion.ways.lattice import Lattice
 from companion.ways.traveller import Traveller
+from companion.ways.way import Way
+from mavlink_bridge.messages import Source, Tunnel
+from mavlink_bridge.wire.goal import unpack
 from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
 
@@ -52,6 +58,28 @@ def test_a_lattice_lies_in_the_middle_of_lanes_wherever_they_are(first: float) -
             assert clear.free(lattice.places[node], lattice.places[other], 0.2)
 
 
+def waiting(at: list[int], nexts: list[int]) -> list[int]:
+    """Vehicles that never go if each waits until its next place has been left."""
+    left = [one for one in range(len(at)) if nexts[one] != at[one]]
+    held = set(at)
+    while free := [one for one in left if nexts[one] not in held]:
+        left = [one for one in left if one not in free]
+        held -= {at[one] for one in free}
+    return left
+
+
+def test_a_full_circle_does_not_turn_while_there_is_a_place_beside_it() -> None:
+    """Four on a square, each with the next corner as its goal; beside one corner is a free place."""
+    beside = [[1, 3], [0, 2], [1, 3, 4], [0, 2], [2]]
+    lengths = [
+        np.array(steps) for steps in ([1, 0, 1, 2, 2], [2, 1, 0, 1, 1], [1, 2, 1, 0, 2], [0, 1, 2, 1, 3])
+    ]
+    nexts = step([0, 1, 2, 3], range(4), lengths, beside)
+    assert not waiting([0, 1, 2, 3], nexts)
+    assert nexts[0] == 1
+    assert 4 in nexts
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_no_two_are_at_one_place_and_none_change_places(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -62,6 +90,7 @@ def test_no_two_are_at_one_place_and_none_change_places(seed: int) -> None:
     for _ in range(30):
         nexts = step(at, random.permutation(7).tolist(), lengths, lattice.beside)
         assert len(set(nexts)) == 7
+        assert not waiting(at, nexts)
         for one, (here, there) in enumerate(zip(at, nexts, strict=True)):
             assert there == here or there in lattice.beside[here]
             for other in range(one):
@@ -79,7 +108,7 @@ def travellers(lattice: Lattice, at: list[int], goals: list[int]) -> dict[int, T
 def test_one_backs_into_the_siding_until_the_other_has_passed() -> None:
     """Each vehicle knows the places and goals only, and goes to what it works out itself."""
     clear = lanes(SIDING)
-    lattice, of = Lattice(clear, 0.2, 0.5), Lanes(clear, 0.2, 0.5)
+    lattice, of = Lattice(clear, 0.2, 0.5), Lanes(clear, 0.2, 0.5, 0.2)
     west, east = (lattice.nearest(np.array([x, 0.0, 1.0])) for x in (-0.5, 4.0))
     at, goals = [west, east], [east, west]
     aside, alone = False, 0
@@ -106,7 +135,7 @@ def test_one_backs_into_the_siding_until_the_other_has_passed() -> None:
 
 def test_a_sub_goal_is_seen_and_far_ones_are_none() -> None:
     clear = lanes(SIDING)
-    of = Lanes(clear, 0.2, 0.5)
+    of = Lanes(clear, 0.2, 0.5, 0.2)
     here, there = np.array([0.53, 0.02, 1.0]), np.array([3.5, 0.0, 1.0])
     assert of.subgoal(11, {11: Traveller(here, there)}) is None
     meets = {11: Traveller(here, there), 12: Traveller(np.array([1.0, 0.0, 1.0]), here)}
@@ -118,6 +147,77 @@ def test_a_sub_goal_is_seen_and_far_ones_are_none() -> None:
     back = of.subgoal(12, meets)
     assert back is not None
     assert back.place[0] > 1.4
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.05, -0.075])
+def test_a_vehicle_pushed_aside_as_far_as_plans_go_sees_its_next_place(aside: float) -> None:
+    """Lines between places keep 0.22 m in a lane of 0.5 m, plans 0.17 m."""
+    clear = lanes(SIDING)
+    of = Lanes(clear, 0.22, 0.5, 0.17)
+    here, there, west = (np.array([x, y, 1.0]) for x, y in ((0.53, aside), (3.5, 0.0), (-0.5, 0.0)))
+    ahead = of.subgoal(11, {11: Traveller(here, there), 12: Traveller(np.array([2.0, 0.0, 1.0]), west)})
+    assert ahead is not None
+    assert np.allclose(ahead.place, [1.5, 0.0, 1.0])
+
+
+def by(x: float, y: float) -> np.ndarray:
+    return np.array([x, y, 0.0])
+
+
+def hall() -> tuple[Lanes, Lattice]:
+    """A room without walls, and its lattice of a metre."""
+    far = Box(kind="box", at=(9.0, 9.0, 1.25), size=(0.5, 0.5, 2.5))
+    clear = Clearance(
+        [far], grid(LIMITS.model_copy(update={"box_max": (4.5, 4.5, 2.5)}), 0.1, 150_000, 1.0), 0.5
+    )
+    return Lanes(clear, 0.2, 1.0, 0.2), Lattice(clear, 0.2, 1.0)
+
+
+@pytest.mark.parametrize("off", [0.0, 0.1, 0.45])
+def test_at_a_goal_beside_its_place_a_vehicle_makes_room_for_those_that_come_past(off: float) -> None:
+    """The places of the two are a metre apart, and the goal is nearer to the other place than that."""
+    of, lattice = hall()
+    place = lattice.places[lattice.nearest(np.array([1.5, 1.5, 1.0]))]
+    goal = place + by(0.0, off)
+    beside, end = place + by(0.0, 1.0), place + by(2.0, 1.0)
+    stands = Traveller(goal, goal, reached=True)
+    comes = {11: stands, 12: Traveller(beside - by(2.0, 0.0), end)}
+    room = of.subgoal(11, comes)
+    if off == 0.0:
+        assert room is None
+        return
+    assert room is not None
+    assert np.allclose(room.place, place)
+    past = {11: Traveller(place, goal, reached=True), 12: Traveller(end, end, reached=True)}
+    assert of.subgoal(11, past) is None
+
+
+def test_vehicles_at_goals_a_metre_apart_stay_there_wherever_the_lattice_lies() -> None:
+    of, lattice = hall()
+    for shift in np.random.default_rng(1).uniform(-0.45, 0.45, (20, 2)):
+        first = lattice.places[lattice.nearest(np.array([1.5, 1.5, 1.0]))] + by(*shift)
+        goals = [first, first + by(0.0, 1.0), first + by(1.0, 0.0)]
+        # At their goals, and at their places.
+        for stand in (goals, [lattice.places[lattice.nearest(goal)] for goal in goals]):
+            known = {11 + k: Traveller(stand[k], goals[k], reached=True) for k in range(3)}
+            for k in range(3):
+                assert of.subgoal(11 + k, known) is None
+
+
+@pytest.mark.parametrize("off", [0.15, 0.5])
+def test_who_has_been_at_the_place_of_its_goal_has_reached_it(off: float) -> None:
+    """Others pass through there: before its goal it would come back again and again, and push them out."""
+    boxes = walls(SIDING)
+    way = Way(WayConfig(clearance=0.0, cell=0.1, lanes=0.5), boxes, LIMITS, 0.2, 10, planar=True)
+    way.prepare(1.0)
+    lattice = Lattice(lanes(SIDING), 0.2, 0.5)
+    place = lattice.places[lattice.nearest(np.array([4.0, 0.0, 1.0]))]
+    told = ToldGoals(Source(11, 1), 7)
+    goals = LaneGoals(11, told, way, in_use=True)
+    goals.subgoal(place - by(off, 0.0), place + by(0.0, 0.24), dict)
+    (message,) = told.messages()
+    assert isinstance(message, Tunnel)
+    assert unpack(message.payload).reached == (off < 0.2)
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from outrider.compare.cells import cells_of
@@ -22,6 +23,8 @@ from outrider.scenarios.starts import places
 from outrider.sweep.cells import task
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
+from tests.companion.avoidance.certified.plans import EPOCH
+from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
 from tests.outrider.compare.test_compare import flight
 
 SPAN = load(find("vehicles", "firefly"), VehicleConfig).span
@@ -182,3 +185,39 @@ def test_vehicles_in_full_physics_change_sides_through_a_maze() -> None:
     assert flown["separation_m"] >= SPAN
     assert flown["obstacle_m"] >= SPAN / 2.0
     assert flown["d_min_violations"] == flown["solver_failures"] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 3])
+def test_ten_whose_goals_lie_beside_the_lattice_s_places_change_sides_through_a_maze(seed: int) -> None:
+    """The companions' certified mode with points in place of autopilots and vehicles.
+
+    In these mazes vehicles that were pushed aside did not see their next places, those at their goals kept
+    others from the places beside these, and six waited for each other in a circle.
+    """
+    comparison, path = loaded("maze-sparse")
+    (cell,) = cells_of(in_physics(comparison, path), path, comparison.rows, None)
+    scenario = scenario_of(Scene.model_validate_json(cell.document), seed)
+    starts, goals = places(scenario)
+    assert goals is not None
+    companion = scenario.companion.model_dump()
+    own = ("limits", "field", "way")
+    swarm = Swarm(
+        starts,
+        Rough(delay=20_000),
+        [Habits()] * len(starts),
+        1,
+        planar=True,
+        settings={
+            key: value for key, value in companion["certified"].items() if key not in ("fleet", "epoch_us")
+        },
+        more={
+            **{key: companion[key] for key in own},
+            "obstacles": [one.model_dump() for one in scenario.obstacles],
+        },
+    )
+    until = 40_000_000
+    swarm.run(until, lambda _since, system: goals[system - 1])
+    ends = np.array([one.plan(EPOCH + until).positions_m()[0] for one in swarm.vehicles])
+    assert np.linalg.norm(ends - goals, axis=1).max() < 0.1
+    assert swarm.faults() == []
