@@ -36,9 +36,14 @@ class DeadlockConfig(Settings):
 class AnticipationConfig(Settings):
     """Turn of the goal to the side because of encounters that are predicted."""
 
-    most: float = Field(0.0, ge=0.0, le=1.5, description="rad, the largest turn; 0 switches it off")
+    most: float = Field(
+        1.2,
+        ge=0.0,
+        le=1.5,
+        description="rad, the largest turn; 0 switches it off; for ``planar`` flights without lanes",
+    )
     wide: Positive = Field(
-        0.2, description="s: wanted distance beyond the least one of plans, that v_max flies in this time"
+        0.1, description="s: wanted distance beyond the least one of plans, that v_max flies in this time"
     )
     room: float = Field(
         2.0,
@@ -48,11 +53,12 @@ class AnticipationConfig(Settings):
         " that has room for them",
     )
     reach: Positive = Field(
-        1.2,
-        description="s: while somebody is met, the plan aims no further ahead than v_max flies in this time",
+        1.4,
+        description="s: while somebody is met, the plan aims no further ahead than v_max flies in this time,"
+        " or than the vehicle needs to brake from v_max",
     )
     fresh: Positive = Field(
-        0.6, description="s: with agreements on plans that are older on average, ``reach`` is no limit"
+        0.6, description="s: with agreements on plans that are older on average, that is no limit"
     )
     wrong_side: float = Field(
         0.5,

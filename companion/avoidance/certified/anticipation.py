@@ -10,9 +10,14 @@ plus ``wide`` · v_max. The encounter has the weight w = 1 − m/D within [0, 1]
 Vehicles that all turn to one side fly round the place where they meet. K = 1 + Σ w of them have a distance of
 about D from each other on a circle of radius K D / 2π. So the goal is turned by atan(``room`` · min(1, Σ w) ·
 K D / (2π ℓ)), with the weighted mean of ℓ, and by ``most`` at most. While there is an encounter, the plan
-aims no further ahead than ``reach``, because rest points further ahead leave the others less room and do not
-make the vehicle faster. That is so while agreements rest on ``fresh`` plans: with old ones the planes follow
-late, and rest points must lie further ahead.
+aims no further ahead than v_max flies in ``reach``, or than the vehicle needs to brake from v_max: rest
+points further ahead leave the others less room and do not make the vehicle faster. That is so while
+agreements rest on ``fresh`` plans: with old ones the planes follow late, and rest points must lie further
+ahead.
+
+Two vehicles need no circle: one plane between them leaves both their straight ways, or nearly so. So a
+vehicle begins to anticipate when Σ w > 1, which takes two others, and goes on until it meets nobody. In space
+planes lead vehicles over each other, which is shorter than a circle: so it is for planar flights alone.
 
 A circle that reaches beyond the goal does not fit: the vehicle would fly round further out than it has to go.
 So if ``room`` · min(1, Σ w) · K D / 2π exceeds the distance from the mean place of the encounters to the
@@ -42,12 +47,14 @@ _LEAST_WAY_M = 0.5
 class Anticipated(NamedTuple):
     """Turn ``angle`` ≥ 0 (rad) of the goal, and the distance (m) that plans may aim ``ahead``.
 
-    ``fits``: whether the circle that the encounters need does not reach beyond the goal.
+    ``fits``: whether the circle that the encounters need does not reach beyond the goal. ``several``: whether
+    these are encounters with more than one vehicle.
     """
 
     angle: float
     ahead: float
     fits: bool = True
+    several: bool = False
 
 
 NOBODY = Anticipated(0.0, inf)
@@ -55,37 +62,55 @@ BEYOND = Anticipated(0.0, inf, fits=False)
 
 
 class Anticipation:
-    """Turns of one vehicle, which leaves encounters whose circle does not fit to the deadlock rule.
+    """Turns of one vehicle among several; those whose circle does not fit are left to the deadlock rule.
 
     The arguments are those of ``anticipated``.
     """
 
-    def __init__(self, config: AnticipationConfig, least: float, speed: float, sense: float) -> None:
-        self._config, self._least, self._speed, self._sense = config, least, speed, sense
-        self._left: list[float] | None = None
+    def __init__(
+        self, config: AnticipationConfig, least: float, speed: float, acceleration: float, sense: float
+    ) -> None:
+        self._config, self._least, self._sense = config, least, sense
+        self._speed, self._acceleration = speed, acceleration
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what was decided: it is not known any more who is met."""
+        self._goal: list[float] | None = None
+        self._begun = self._left = False
 
     def met(self, own: Array, others: Array) -> Anticipated:
         """Return how to avoid ``others`` (M, 2, 3), m, on the ``own`` way (2, 3), m.
 
-        NOBODY from when a circle does not fit until nobody is met or the goal is another one.
+        To be called for each plan. NOBODY before several are met, and from when a circle does not fit, until
+        nobody is met or the goal is another one.
         """
-        found = anticipated(self._config, self._least, self._speed, own, others, sense=self._sense)
+        limits = self._speed, self._acceleration
+        found = anticipated(self._config, self._least, *limits, own, others, sense=self._sense)
         goal = own[1].tolist()
-        if found == NOBODY or (self._left is not None and dist(self._left, goal) > _AT_GOAL_M):
-            self._left = None
-        if not found.fits:
-            self._left = goal
-        return found if self._left is None else NOBODY
+        if found == NOBODY or self._goal is None or dist(self._goal, goal) > _AT_GOAL_M:
+            self.restart()
+            self._goal = goal
+        self._begun |= found.several
+        self._left |= not found.fits
+        return found if self._begun and not self._left else NOBODY
 
 
 def anticipated(
-    config: AnticipationConfig, least: float, speed: float, own: Array, others: Array, *, sense: float
+    config: AnticipationConfig,
+    least: float,
+    speed: float,
+    acceleration: float,
+    own: Array,
+    others: Array,
+    *,
+    sense: float,
 ) -> Anticipated:
     """Return how to avoid encounters by a turn to the side of ``sense``: +1 right.
 
-    ``least`` (m): the least distance of plans. ``speed`` (m/s): the largest one of the own plans. ``own``
-    (2, 3), m: where the own plan begins, and the goal. ``others`` (M, 2, 3), m: where the other vehicles are
-    then, and their goals. BEYOND: they need a circle that does not fit.
+    ``least`` (m): the least distance of plans. ``speed`` (m/s) and ``acceleration`` (m/s²): the largest ones
+    of the own plans. ``own`` (2, 3), m: where the own plan begins, and the goal. ``others`` (M, 2, 3), m:
+    where the other vehicles are then, and their goals. BEYOND: they need a circle that does not fit.
     """
     place, goal = own.tolist()
     way, x, y = _direction(place, goal)
@@ -119,7 +144,8 @@ def anticipated(
     if radius > way - length:
         return BEYOND
     angle = atan2(radius, max(length, _LEAST_WAY_M))
-    return Anticipated(min(angle, config.most), config.reach * speed)
+    ahead = speed * max(config.reach, 0.5 * speed / acceleration)
+    return Anticipated(min(angle, config.most), ahead, several=weights > 1.0)
 
 
 def _direction(place: list[float], goal: list[float]) -> tuple[float, float, float]:

@@ -79,8 +79,8 @@ class CertifiedFlight:
         least = from_surfaces(certified, config.field, config.limits) + BESIDE_M
         self._way = way_of(config, least, _EFFORT, BESIDE_M)
         between = self._sources.between
-        speed = min(config.limits.v_max[:2])
-        self._anticipation = Anticipation(certified.anticipation, between, speed, sense)
+        fastest = min(config.limits.v_max[:2]), min(config.limits.u_max[:2])
+        self._anticipation = Anticipation(certified.anticipation, between, *fastest, sense)
         downwash = config.field.downwash
         distances = Distances(between, further(certified), steps, planar=config.planar, downwash=downwash)
         self.agreements = Agreements(
@@ -107,6 +107,8 @@ class CertifiedFlight:
         """Number of times that the vehicle left the tube."""
         self._outside = 0.0
         in_lanes = config.way is not None and config.way.lanes is not None
+        # In space vehicles pass over each other, in lanes they give way.
+        self._anticipates = config.planar and certified.anticipation.most > 0.0 and not in_lanes
         self._goals = ToldGoals(own, fleet.fingerprint)
         self._lane_goals = LaneGoals(own.system, self._goals, self._way, in_use=in_lanes)
         self._in_lane = False
@@ -365,13 +367,19 @@ class CertifiedFlight:
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
         destination = self._places.destination(epoch, own[-1, 2], aim, self.agreements)
-        anticipates = self._config.certified.anticipation.most > 0.0 and aim.path is None
+        anticipates = self._anticipates and aim.path is None
         self._goals.tell(destination if anticipates else None)
         subgoal = self._subgoal(now, epoch, own[-1, 2], destination)
         goal = subgoal.place
+        if anticipates:
+            met = self._met(now, start, destination)
+        else:
+            self._anticipation.restart()
+            met = NOBODY
         if not self._in_lane:
             place = own[0, 0]
-            met = self._met(now, start, goal) if anticipates else NOBODY
+            # A sub-goal that is turned aside is not on the way any more, and may not be free.
+            met = NOBODY if subgoal.beyond > 0.0 else met
             goal = self._deadlock_turn.turned(place, goal, met.angle)
             if met.ahead < inf:
                 goal = place + limit(goal - place, met.ahead)
@@ -410,10 +418,9 @@ class CertifiedFlight:
         """
         begins, plans, told = start.epoch, self.agreements.newest(), self._goals.recent(now)
         met = [system for system in sorted(told) if system in plans]
-        if not met:
-            return NOBODY
         places = [plans[s].later(max(begins, plans[s].plan.epoch), 1)[0, 0] for s in met]
-        others = np.stack([places, [told[system].position_m for system in met]], axis=1)
+        ways = [(place, told[system].position_m) for system, place in zip(met, places, strict=True)]
+        others = np.array(ways).reshape(-1, 2, 3)
         found = self._anticipation.met(np.stack([start.position_m, goal]), others)
         fresh = self._config.certified.anticipation.fresh
         return found if self.agreements.age(begins, met) <= fresh else found._replace(ahead=inf)
