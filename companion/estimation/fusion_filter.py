@@ -81,8 +81,13 @@ _KNOWN, _LEAST_SCALE = 25.0, 0.25
 Errors of yaw move the place in proportion to the true distance, and errors of pixels and height grow with it.
 With the measured distance the filter would learn the yaw from its noise, and would trust too short distances
 more than too long ones: a bias of 2σ² of the relative error. R is scaled by the square of the ratio, within
-limits.
+limits. So is the direction: R is long along the ray and thin across it. With the measured ray as axis, an
+error n across the ray looks like one along it of −n²/r (r: distance), which R trusts as an error across: the
+place comes nearer to the camera by 2σ_l²/r, 0.11 m where σ_l along the ray is 0.65 m at 7.8 m, however small
+the error across is. The axis is therefore the ray on which the detection is expected.
 """
+_LEAST_LEVEL = 0.1
+"""Cosine of the elevation below which the measured axes are used: yaw moves nothing straight below."""
 _GAIN = 0.999
 """An estimate by others is used if it lowers the trace to less than this share."""
 _CONFIRMED_S = 0.5
@@ -186,6 +191,64 @@ def _inverse(S: Array, out: Array) -> None:
     out[0, 0], out[0, 1], out[0, 2] = A * scale, B * scale, C * scale
     out[1, 0], out[1, 1], out[1, 2] = B * scale, (a * f - c * c) * scale, (b * c - a * e) * scale
     out[2, 0], out[2, 1], out[2, 2] = C * scale, (b * c - a * e) * scale, (a * d - b * b) * scale
+
+
+@part
+def _variance(P: Array, base: int, along: Array, yaw: float, elevation: float) -> float:
+    """Return the variance (m²), by ``P``, of an expected detection ``along`` a direction (3,).
+
+    ``base``: place of the errors of its vehicle; ``yaw`` and ``elevation``: m per rad, along the direction.
+    """
+    total = 0.0
+    for i in range(8):
+        j = i if i < 3 else base + i - 3
+        weight = along[i % 3] if i < 6 else (yaw if i == 6 else elevation)
+        for k in range(8):
+            m = k if k < 3 else base + k - 3
+            total += weight * P[j, m] * (along[k % 3] if k < 6 else (yaw if k == 6 else elevation))
+    return total
+
+
+@part
+def _expected(
+    x: Array, P: Array, base: int, distance: float, row: Array, R: Array, sideways: Array, up: Array
+) -> None:
+    """Write the covariance R (3, 3) of the camera, and the directions of yaw and elevation, (3,).
+
+    They are those of the detection ``row`` (FIELDS,), turned from the measured ray to the one on which it is
+    expected: from the camera to the estimated place, by the estimated errors of its vehicle, the states ``x``
+    from ``base`` on. ``distance`` (m): of the estimated place. By the error of this direction, by ``P``, an
+    error along the ray is one across the axis: R is so much wider.
+    """
+    ahead, measured = np.empty(3), np.empty(3)
+    for a in range(3):
+        measured[a] = row[a] - row[18 + a]
+        ahead[a] = x[a] + x[base + a] - row[18 + a]
+        ahead[a] += distance * (row[12 + a] * x[base + 3] + row[15 + a] * x[base + 4])
+    length = sqrt(ahead[0] * ahead[0] + ahead[1] * ahead[1] + ahead[2] * ahead[2])
+    level = sqrt(ahead[0] * ahead[0] + ahead[1] * ahead[1])
+    flat = sqrt(sideways[0] * sideways[0] + sideways[1] * sideways[1])
+    far = sqrt(measured[0] * measured[0] + measured[1] * measured[1] + measured[2] * measured[2])
+    if not (level > _LEAST_LEVEL * length and flat > _LEAST_LEVEL and far > 0.0):
+        return
+    along = high = wide = 0.0
+    for a in range(3):
+        for b in range(3):
+            along += measured[a] * R[a, b] * measured[b] / (far * far)
+            high += up[a] * R[a, b] * up[b]
+            wide += sideways[a] * R[a, b] * sideways[b] / (flat * flat)
+    sideways[0], sideways[1], sideways[2] = -ahead[1] / length, ahead[0] / length, 0.0
+    up[0], up[1] = -ahead[2] * ahead[0] / (level * length), -ahead[2] * ahead[1] / (level * length)
+    up[2] = level / length
+    for a in range(3):
+        measured[a] = sideways[a] * length / level
+    share = along / (length * length)
+    wide += share * _variance(P, base, measured, distance * level / length, 0.0)
+    high += share * _variance(P, base, up, 0.0, distance)
+    for a in range(3):
+        for b in range(3):
+            R[a, b] = (along - wide) * ahead[a] * ahead[b] / (length * length) + (high - wide) * up[a] * up[b]
+        R[a, a] += wide
 
 
 @part
@@ -294,6 +357,7 @@ def replay(
     B, K, S, T = np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 3)), np.empty((3, 3))
     y, u, place, R = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     F, Q, L, moved = np.empty(4), np.empty(6), np.empty((TARGET, TARGET)), np.zeros(3)
+    sideways, up = np.empty(3), np.empty(3)
     for i in range(first, count):
         if i == 0:
             X[i], PP[i], memories[i] = x0, P0, memory0
@@ -343,6 +407,7 @@ def replay(
         for a in range(3):
             for b in range(3):
                 R[a, b], place[a, b] = data[i, 3 + 3 * a + b], P[a, b]
+            sideways[a], up[a] = data[i, 12 + a], data[i, 15 + a]
         distance = data[i, 21]
         if slot >= 0:
             if place[0, 0] + place[1, 1] + place[2, 2] < _KNOWN:
@@ -350,6 +415,7 @@ def replay(
                 for a in range(3):
                     square += (x[a] - data[i, 18 + a]) ** 2
                 distance = sqrt(square)
+                _expected(x, P, base, distance, data[i], R, sideways, up)
             scale = min(max((distance / data[i, 21]) ** 2, _LEAST_SCALE), 1.0 / _LEAST_SCALE)
             for a in range(3):
                 for b in range(3):
@@ -360,7 +426,7 @@ def replay(
                     # An image that is late shows the target where it was.
                     R[a, b] += noise[_TIME] * x[3 + a] * x[3 + b]
         for a in range(3):
-            g, h = distance * data[i, 12 + a], distance * data[i, 15 + a]
+            g, h = distance * sideways[a], distance * up[a]
             y[a] = data[i, a] + moved[a] - x[a]
             if slot >= 0:
                 y[a] -= x[base + a] + g * x[base + 3] + h * x[base + 4]
@@ -370,7 +436,7 @@ def replay(
                     B[j, a] += P[j, base + a] + g * P[j, base + 3] + h * P[j, base + 4]
         for a in range(3):
             for b in range(3):
-                g, h = distance * data[i, 12 + a], distance * data[i, 15 + a]
+                g, h = distance * sideways[a], distance * up[a]
                 S[a, b] = B[a, b] + R[a, b]
                 if slot >= 0:
                     S[a, b] += B[base + a, b] + g * B[base + 3, b] + h * B[base + 4, b]

@@ -77,12 +77,14 @@ def spread(source: FusedSource, random, late, seconds: float = 9.0) -> float:
     return float(np.trace(at(fused(source, found), found[-1].time).covariance))
 
 
-def ahead(path: Path, rate: float, seconds: float = 1.6, settled: float = 2.0) -> tuple[float, float]:
+def ahead(
+    path: Path, rate: float, seconds: float = 1.6, settled: float = 2.0, seed: int = 31
+) -> tuple[float, float]:
     """Return the RMS of errors (m) of the way in the next ``seconds``, by the estimates of one flight.
 
     First with ``rate`` times the estimated turn rate, then straight on.
     """
-    source, random = source_of("rtk", 0.5), np.random.default_rng(31)
+    source, random = source_of("rtk", 0.5), np.random.default_rng(seed)
     cameras = [Vehicle(11 + k, 1.3 * k, source, random) for k in range(5)]
     fusion, squares = Fusion(source, WINDOW), []
     for tick in range(round(1e6 * SECONDS / STEP)):
@@ -109,7 +111,7 @@ def test_the_way_ahead_bends_as_the_targets():
 
 
 def test_of_a_target_that_walks_straight_on_the_way_ahead_is_about_straight():
-    bent, straight = ahead(line, 1.0)
+    bent, straight = np.mean([ahead(line, 1.0, seed=seed) for seed in range(31, 37)], axis=0)
     assert bent < straight + 0.1
 
 
