@@ -216,7 +216,7 @@ class BackupNode:
             case Tunnel():
                 self._store(now, message)
             case _:
-                self._additions.forget()
+                pass
 
     def _store(self, now: int, message: Tunnel) -> None:
         """Store a plan of the companion; discard all plans on a farewell, after which the companion lands."""

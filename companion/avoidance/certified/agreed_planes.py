@@ -12,6 +12,7 @@ import numpy as np
 
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.separating_planes import AGREED
+from companion.errors import CompanionError
 from companion.values.horizon import Array
 
 _ROW = 8 * AGREED
@@ -45,10 +46,14 @@ def made(own: StoredPlan, other: StoredPlan, rows: Rows) -> AgreedPlanes:
 def stacked(agreed: list[AgreedPlanes], epoch: int, dt: int, steps: int) -> Array:
     """Return the rows (A, n + 1, 12) of all ``agreed`` from ``epoch`` (µs) on.
 
-    It is a knot, and no plan of ``agreed`` begins later. ``dt`` (µs) and ``steps`` n: of all plans.
+    ``dt`` (µs) and ``steps`` n: of all plans. Raises CompanionError if ``epoch`` is no knot of ``agreed``, or
+    before the beginning of one.
     """
     size, found = _ROW * (steps + 1), []
     for one in agreed:
-        first = _ROW * min((epoch - one.epoch) // dt, steps)
+        knots, between = divmod(epoch - one.epoch, dt)
+        if knots < 0 or between:
+            raise CompanionError(f"an agreement of {one.epoch} has no planes for {epoch}: no later knot")
+        first = _ROW * min(knots, steps)
         found.append(one.data[first : first + size])
     return np.frombuffer(b"".join(found)).reshape(-1, steps + 1, AGREED)

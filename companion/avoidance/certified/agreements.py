@@ -20,6 +20,7 @@ from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan, read, stored
 from companion.config.certified import CertifiedConfig
+from companion.errors import CompanionError
 from companion.values.horizon import Array
 from companion.values.refused_senders import RefusedSenders
 from mavlink_bridge.errors import PlanWireError
@@ -389,8 +390,18 @@ class Agreements:
         )
 
     def agreed(self) -> list[AgreedPlanes]:
-        """Return the planes of all agreements that are kept, in the order of system ids."""
-        return [peer.agreed[one] for _, peer in sorted(self._peers.items()) for one in peer.pair.kept]
+        """Return the planes of all agreements that are kept, in the order of system ids.
+
+        Raises CompanionError if those of one are missing.
+        """
+        found = []
+        for system, peer in sorted(self._peers.items()):
+            for one in peer.pair.kept:
+                planes = peer.agreed.get(one)
+                if planes is None:
+                    raise CompanionError(f"the planes of the agreement {one} with {system} are not filed")
+                found.append(planes)
+        return found
 
     def unanswered(self) -> list[WirePlan]:
         """Return the own plans of proposals without an answer, the oldest first, without the newest plan.

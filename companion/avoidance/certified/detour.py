@@ -57,7 +57,10 @@ class Detour:
         if free(here, there[None], without(here, without(there, choices[0])))[0]:
             self._way = self._looking = None
             return Subgoal(goal, 0.0)
-        if not self._still_free(here, there, choices[0]):
+        if self._still_free(here, there, choices[0]):
+            self._looking = None
+        else:
+            # Until the search ends the old way is followed: straight on leads back into the pocket.
             self._search(now, here, there, choices)
         return Subgoal(goal, 0.0) if self._way is None else self._along(self._way, rest, goal)
 
@@ -66,8 +69,6 @@ class Detour:
             if now < self._next_search:
                 return
             self._looking = self._first(here, there, choices)
-        # While it is searched there is no way: the old one is not free.
-        self._way = None
         for _ in range(_PARTS):
             try:
                 next(self._looking)

@@ -184,6 +184,7 @@ class Peer:
         """Discard all agreements with the peer, see ``Pair.void``."""
         self.settled = None
         self.pair.void(others_since)
+        self.agreed.clear()
         self._proposed.clear()
         self.changed = True
 

@@ -13,6 +13,7 @@ from companion.avoidance.certified.committed import controls
 from companion.avoidance.certified.deadlock import mean_velocities
 from companion.avoidance.certified.peer_plans import StoredPlan, stored
 from companion.avoidance.certified.separating_planes import Others, planes
+from companion.errors import CompanionError
 from tests.companion.avoidance.certified.plans import DT, STEPS, random_plan
 
 LENGTH = DT
@@ -58,6 +59,14 @@ def test_they_are_those_of_the_two_plans(
         np.testing.assert_array_equal(part, wanted)
     velocities = (mean_velocities(others, 1.0, 2) for others in (agreed, whole))
     np.testing.assert_array_equal(*velocities)
+
+
+@pytest.mark.parametrize("off", [-LENGTH, LENGTH // 2])
+def test_there_are_none_before_the_agreement_or_between_knots(off: int) -> None:
+    own, other = pair(1, (False, False), 2)
+    one = made(own, other, Distances(1.5, FURTHER, STEPS).agreed)
+    with pytest.raises(CompanionError, match="no planes for"):
+        stacked([one], other.plan.epoch + off, DT, STEPS)
 
 
 def test_they_come_before_those_of_pairs_that_share_nothing() -> None:

@@ -446,7 +446,8 @@ def ignore_the_column(patch: pytest.MonkeyPatch) -> None:
     """Planes near a column are in space."""
 
     def in_space(self: Distances, own: Array, other: Array, columns: int) -> Array:
-        return agreed_planes(own, other, self.least(columns))
+        upright, downwash = self._planar, self._downwash
+        return agreed_planes(own, other, self.least(columns), upright=upright, downwash=downwash)
 
     patch.setattr(Distances, "agreed", in_space)
 

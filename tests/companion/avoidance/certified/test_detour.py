@@ -243,7 +243,10 @@ def test_no_plan_does_more_than_a_part_of_a_search(closed: bool, monkeypatch: py
 
 
 def test_a_blocked_way_is_searched_anew_without_a_stall() -> None:
-    """The search takes several plans; there is progress in them, because the deadlock's turn began anew."""
+    """The search takes several plans; there is progress in them, because the deadlock's turn began anew.
+
+    Until it ends the vehicle follows the old way: straight to the goal it would fly back into the pocket.
+    """
     here, there, discs = boxes(1)
     open_ = discs._replace(centres=np.delete(discs.centres, [5, 6, 7], axis=0), radii=discs.radii[3:])
     limits = LimitsConfig(box_min=(-30.0, -30.0, 3.0), box_max=(30.0, 30.0, 10.0))
@@ -261,6 +264,8 @@ def test_a_blocked_way_is_searched_anew_without_a_stall() -> None:
         found = detour.towards(200_000 * later, rest, goal, lambda: [blocking], stalled=False).place
         if detour.begun == 2:
             break
+        np.testing.assert_allclose(found, aside)
+    assert later > plan + 1
     assert detour.begun == 2
     assert np.abs(found - aside).max() > 0.1
 
