@@ -15,6 +15,7 @@ once, at its centre, and its cells only with those that are near.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import lru_cache
 from math import inf, sqrt
 
@@ -24,6 +25,7 @@ from companion.config.obstacles import Obstacle
 from companion.config.planning import LimitsConfig
 from companion.obstacles.static import FixedObstacles
 from companion.values.horizon import Array
+from companion.ways.balls import Balls
 from companion.ways.grid import Grid, Indices, grid
 from companion.ways.lines import compare
 
@@ -54,6 +56,15 @@ class Clearance:
                 inside = self._inside(block)
                 self.cells[inside] = self._least(near, places.places(inside))
         self.cells.flags.writeable = False
+        self._balls: Balls | None = None
+
+    def among(self, balls: Balls) -> Clearance:
+        """Return these clearances with ``balls`` as obstacles, too."""
+        found = copy(self)
+        found._balls = balls
+        found.cells = np.minimum(self.cells, balls.distance(self.grid.places(np.arange(len(self.grid)))))
+        found.cells.flags.writeable = False
+        return found
 
     def at(self, points: Array) -> Array:
         """Return the clearances (n,), m, of ``points`` (n, 3), m, at most ``most``."""
@@ -65,7 +76,7 @@ class Clearance:
             if near is not None:
                 here = blocks == block
                 found[here] = self._least(near, points[here])
-        return found
+        return found if self._balls is None else np.minimum(found, self._balls.distance(points))
 
     def sees(self, start: Array, end: Array, clearance: float) -> bool:
         """Return whether about all between ``start`` and ``end`` (3,), m, keeps the ``clearance`` (m).

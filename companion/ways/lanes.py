@@ -69,10 +69,10 @@ class Lanes:
         goal = None if hinders else goals[me]
         return self._along(path, others, travellers[own], goal, lengths[me])
 
-    def has_been_at(self, rest: Array, goal: Array, within: float) -> bool:
-        """Return whether ``rest`` (3,), m, is ``within`` (m) of the place of ``goal`` (3,), m."""
+    def at_goal(self, rest: Array, goal: Array) -> bool:
+        """Return whether a plan that ends at ``rest`` (3,) ends at the place of its ``goal`` (3,), m."""
         node = self._lattice.nearest(goal)
-        return node >= 0 and float(np.abs(self._lattice.places[node] - rest)[:2].max()) < within
+        return node >= 0 and node == self._lattice.nearest(rest)
 
     def _places(self, systems: list[int], travellers: Mapping[int, Traveller]) -> list[int]:
         """Return the places at which the plans of ``systems`` end, a different one for each; −1 for none.

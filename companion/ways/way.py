@@ -5,11 +5,14 @@ place of the way that it sees: the sub-goal moves on along the way with the vehi
 largest clearance first: a way with more room is preferred to a shorter one. A search is spread over plans, in
 parts that do not depend on the speed of the computer. Until it ends, the vehicle aims along the way that it
 has, and without one at the destination, as it does where there is no way.
+
+Others may rest where a way leads, in gaps that are too narrow then. A vehicle that makes no progress along
+its way searches another one that passes them, too, and keeps the one it had if there is none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from math import inf
 
 import numpy as np
@@ -18,6 +21,7 @@ from companion.config.obstacles import Obstacle
 from companion.config.planning import LimitsConfig
 from companion.config.way import WayConfig
 from companion.values.horizon import Array
+from companion.ways.balls import Balls
 from companion.ways.clearance import Clearance, clearance_of
 from companion.ways.finding import Found, finding
 from companion.ways.followed import Followed
@@ -32,6 +36,8 @@ _MOVED_M = 0.5
 """Distance by which the destination or the vehicle must have moved before a search is repeated."""
 _JUMP_M = 2.0
 """Distance from which on the destination is another one: from where it would be if it moved on as before."""
+_AGAIN_US = 5_000_000
+"""Shortest time (µs) between two searches of a way past others that rest."""
 _AT_REST: Array = np.zeros(3)
 
 
@@ -67,6 +73,8 @@ class Way:
         self._goal: Array | None = None
         self._step = _AT_REST
         self._lanes: Lanes | None = None
+        self._among: Clearance | None = None
+        self._next_round = 0
         self._floor = -inf
         self.begun = 0
         """Number of ways that were begun."""
@@ -77,7 +85,7 @@ class Way:
 
     def forget(self) -> None:
         """Drop the way and the search of one, because the next destination is another one."""
-        self._followed = self._search = self._ends = self._lower = self._goal = None
+        self._followed = self._search = self._ends = self._lower = self._goal = self._among = None
         self._step, self.enclosed = _AT_REST, False
 
     def keep_above(self, floor: float) -> None:
@@ -85,6 +93,22 @@ class Way:
         if floor != self._floor:
             self._floor = floor
             self.forget()
+
+    def go_round(self, now: int, others: Callable[[], Balls]) -> None:
+        """Search another way past ``others``, which rest, because no progress is made; ``now`` in µs.
+
+        Not again within 5 s. If there is none, a way among fixed obstacles alone is searched again.
+        """
+        if self._clear is None or now < self._next_round:
+            return
+        self._next_round = now + _AGAIN_US
+        self._among = self._clear.among(others())
+        self._followed = self._search = self._ends = self._lower = None
+
+    @property
+    def goes_round(self) -> bool:
+        """Whether the way that is followed or searched passes others that rest."""
+        return self._among is not None
 
     def prepare(self, height: float) -> None:
         """Work out the clearances and the lanes at ``height`` (m) of a planar vehicle, before it plans there.
@@ -107,14 +131,15 @@ class Way:
                 self.forget()
             self._step = step
         self._goal = goal
-        clear = self._clear_at(float(place[2]))
+        fixed = self._clear_at(float(place[2]))
+        clear = fixed if self._among is None else self._among
         self._planned = True
         height = float(goal[2])
         here, there = place, goal
         if self._level == self._level:
             here, there = (np.array([x, y, self._level]) for x, y in (place[:2], goal[:2]))
         if self._straight(clear, here, there):
-            self._followed = self._search = self._ends = None
+            self._followed = self._search = self._ends = self._among = None
             self.enclosed, self.clear = False, True
             return Subgoal(goal, 0.0)
         before = self._followed
@@ -142,7 +167,7 @@ class Way:
     def _clear_at(self, height: float) -> Clearance:
         """Return the clearances; those of a planar vehicle are at the ``height`` (m) of its first plan."""
         if self._clear is None or not (self._planned or height == self._level):
-            self._level, self._lanes = height, None
+            self._level, self._lanes, self._among = height, None, None
             self._clear = self._clearance(height)
         return self._clear
 
@@ -191,10 +216,13 @@ class Way:
                 return
 
     def _take(self, clear: Clearance, found: Found | None, place: Array, goal: Array) -> None:
-        """Follow the way that was ``found``."""
-        self.enclosed = found is None
+        """Follow the way that was ``found``; where others leave none there may be one without them."""
+        alone = self._among is None
+        self.enclosed = alone and found is None
         self._followed = self._lower = None
         if found is None:
+            if not alone:
+                self._among = self._ends = None
             return
         self.begun += 1
         self._lower = (found.level, goal) if found.level else None

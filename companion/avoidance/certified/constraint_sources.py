@@ -26,6 +26,7 @@ from companion.obstacles.boxes import boxes_of
 from companion.obstacles.static import Axes, FixedObstacles
 from companion.values.boxes import Boxes, BoxIndex, distances
 from companion.values.horizon import Array
+from companion.ways.balls import Balls
 from companion.world import View, World
 
 _SIGHT_MARGIN_M = 1.0
@@ -262,6 +263,24 @@ class ConstraintSources:
             _discs(found)._replace(rectangles=rectangles)
             for found in (fixed + landed + vehicles, fixed + landed)
         ]
+
+    def at_rest(self, epoch: int, height: float, agreements: Agreements) -> Balls:
+        """Return where others rest that a way must pass from ``epoch`` (µs) on, beside fixed obstacles.
+
+        These are landed vehicles, and those whose newest plan rests. In a plane, and in columns, they are at
+        the ``height`` (m) of the way. Plans keep as much from these as from fixed obstacles.
+        """
+        places, kept = [], []
+        for last in agreements.left.values():
+            places.append([*last.controls[-1, 2, :2], height])
+            kept.append(self.from_last(last))
+        for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():
+            if system not in agreements.left:
+                level = self._config.planar or system in agreements.columns
+                places.append([*end[:2], height if level else end[2]])
+                kept.append(self.between)
+        radii = np.array(kept) - self._from_surfaces
+        return Balls(np.array(places).reshape(-1, 3), radii, self._config.field.downwash)
 
     def _rectangles(self, here: Array, there: Array) -> Rectangles:
         """Return where boxes keep a vehicle away on a way from ``here`` to ``there`` (3,), m.

@@ -46,6 +46,8 @@ from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack
 _TURNING_SENSES = {"left": -1.0}
 _EFFORT = 2
 """How much of a search is done for a plan."""
+_MOVED_M = 0.5
+"""Distance by which the end of the plan must have moved before another way counts as another one."""
 _STOOD_US = 1_000_000
 """Time (µs) within the tube of a plan at rest after which a vehicle that another controller flies stands."""
 
@@ -112,6 +114,7 @@ class CertifiedFlight:
         self._goals = ToldGoals(own, fleet.fingerprint)
         self._lane_goals = LaneGoals(own.system, self._goals, self._way, in_use=in_lanes)
         self._in_lane = False
+        self._began_at: Array | None = None
         self._in_control = self._announced = self._received = self._participated = False
         self._turn = 0
         self._prepared, self._begun_at = False, 0
@@ -393,6 +396,8 @@ class CertifiedFlight:
         """
         way, detour = self._way, self._detour
         begun = detour.begun, 0 if way is None else way.begun
+        if way is not None and self._deadlock_turn.stalled:
+            way.go_round(now, lambda: self._sources.at_rest(epoch, rest[2], self.agreements))
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
         in_lane = self._lane_goals.subgoal(rest, destination, self.agreements.ends)
         if self._in_lane != (in_lane is not None):
@@ -408,8 +413,18 @@ class CertifiedFlight:
             stalled=self._deadlock_turn.stalled,
         )
         if (detour.begun, 0 if way is None else way.begun) != begun:
-            self._deadlock_turn.restart()
+            self._restart(rest, goes_round=detour.begun != begun[0] or (way is not None and way.goes_round))
         return Subgoal(subgoal.place, subgoal.beyond + goal.beyond)
+
+    def _restart(self, rest: Array, *, goes_round: bool) -> None:
+        """Measure progress anew on another way from ``rest`` (3,), m.
+
+        Where a way is lost and found again at the same place, as at a corner of an obstacle beside which
+        somebody rests, that is no progress, unless the new one ``goes_round`` what rests.
+        """
+        if goes_round or self._began_at is None or float(np.abs(rest - self._began_at).max()) > _MOVED_M:
+            self._began_at = rest.copy()
+            self._deadlock_turn.restart()
 
     def _met(self, now: int, start: WirePlan, goal: Array) -> Anticipated:
         """Return how to avoid encounters on the way from the ``start`` of the plan to ``goal`` (3,), m.

@@ -50,7 +50,7 @@ class LaneGoals:
         self._goal = destination
         lanes = None if self._way is None else self._way.lanes()
         self._reached |= float(np.abs(rest - destination).max()) < _REACHED_M or (
-            lanes is not None and lanes.has_been_at(rest, destination, _REACHED_M)
+            lanes is not None and lanes.at_goal(rest, destination)
         )
         self._goals.tell(destination, reached=self._reached)
         if lanes is None:
