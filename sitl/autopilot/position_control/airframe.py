@@ -26,7 +26,8 @@ class Airframe(NamedTuple):
     ``angle_rate`` 1/s: requested tilt rate per angle of error; ``angle_acceleration`` rad/s²: limit of the
     change of that rate; ``angle_lag`` s: first-order lag from the requested angle to the tilt; ``thrust_lag``
     s: lag of vertical thrust. ``drag`` 1/s and ``square_drag`` 1/m: deceleration per speed, and per square of
-    speed, relative to the air. ``vertical_drag``: whether drag also acts vertically.
+    speed, relative to the air. ``vertical_drag``: whether drag also acts vertically. ``thrust`` m/s²: the
+    largest thrust per mass, along the tilted axis.
     """
 
     angle_rate: float
@@ -36,8 +37,14 @@ class Airframe(NamedTuple):
     drag: float
     square_drag: float
     vertical_drag: bool
+    thrust: float = math.inf
 
 
+HOVER_THROTTLE: Final = 0.364
+"""Throttle at which the 3 kg quadrotor of ArduPilot's SITL hovers, as its logs tell (CTUN.ThO).
+
+AP_Motors makes the thrust proportional to the throttle. Another frame hovers at another throttle.
+"""
 ARDUPILOT: Final = Airframe(
     # ATC_INPUT_TC 0.15 s and ATC_ACCEL_R_MAX 1100 °/s²; the lag represents the attitude and rate loops.
     angle_rate=1.0 / 0.15,
@@ -50,6 +57,7 @@ ARDUPILOT: Final = Airframe(
     drag=0.246,
     square_drag=0.0336,
     vertical_drag=False,
+    thrust=GRAVITY / HOVER_THROTTLE,
 )
 PX4: Final = Airframe(
     # MC_ROLL_P; the rate loop is much faster than the angle loop.
@@ -101,12 +109,15 @@ class PointMass:
         )
         north, east, down = (v - w for v, w in zip(self.velocity, wind, strict=True))
         drag, square = frame.drag, frame.square_drag
-        # Rotors do not push downwards.
+        aside = math.tan(self._tilt[0]), math.tan(self._tilt[1])
+        # Rotors do not push downwards, and a tilted vehicle has less than its full thrust upwards.
+        most = frame.thrust / math.hypot(1.0, *aside)
+        self._vertical_acceleration = max(self._vertical_acceleration, GRAVITY - most)
         lift = max(GRAVITY - self._vertical_acceleration, 0.0)
         self._integrate(
             (
-                lift * math.tan(self._tilt[0]) - (drag + square * abs(north)) * north,
-                lift * math.tan(self._tilt[1]) - (drag + square * abs(east)) * east,
+                lift * aside[0] - (drag + square * abs(north)) * north,
+                lift * aside[1] - (drag + square * abs(east)) * east,
                 self._vertical_acceleration - (drag * down if frame.vertical_drag else 0.0),
             ),
             dt,

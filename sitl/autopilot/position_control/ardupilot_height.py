@@ -2,7 +2,8 @@
 
 The velocity controller asks for an acceleration, and a PI controller of the *measured* acceleration moves the
 throttle from that of hover. So about half of a change of the acceleration comes at once, and the rest within
-a second, as the integral learns it.
+a second, as the integral learns it. The integral is bounded by PSC_ACCZ_IMX alone: that of the firmware also
+stops to grow at a limit of the throttle, so this one overshoots more after such a limit.
 """
 
 from __future__ import annotations
@@ -10,12 +11,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from sitl.autopilot.position_control.airframe import GRAVITY
+from sitl.autopilot.position_control.airframe import GRAVITY, HOVER_THROTTLE
 from sitl.autopilot.position_control.square_root import square_root_law
 from sitl.config.gains import ArduPilotGains, Speeds
 
-HOVER_THROTTLE: Final = 0.364
-"""Throttle at which the 3 kg quadrotor of ArduPilot's SITL hovers, as its logs tell (CTUN.ThO)."""
 _PER_THROTTLE: Final = GRAVITY / HOVER_THROTTLE
 """Acceleration (m/s²) per throttle: AP_Motors makes the thrust proportional to it."""
 _HIGHEST: Final = _PER_THROTTLE - GRAVITY

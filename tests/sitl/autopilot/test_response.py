@@ -15,8 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from sitl.autopilot.firmware import Mode
 from sitl.autopilot.guidance import Guidance
-from sitl.autopilot.position_control.airframe import ARDUPILOT, GRAVITY, PX4, Airframe, Motion, PointMass
-from sitl.autopilot.position_control.ardupilot_height import HOVER_THROTTLE
+from sitl.autopilot.position_control.airframe import (
+    ARDUPILOT,
+    GRAVITY,
+    HOVER_THROTTLE,
+    PX4,
+    Airframe,
+    Motion,
+    PointMass,
+)
 from sitl.autopilot.position_control.px4 import _within
 from sitl.autopilot.response import Response, response_of
 from sitl.config.autopilot import AutopilotConfig
@@ -330,6 +337,18 @@ def test_the_same_tilt_pushes_less_the_less_thrust_there_is(
     lift = max(GRAVITY - wanted[2], 0.0) / GRAVITY
     expected = (wanted[0] * lift, wanted[1] * lift, wanted[2])
     np.testing.assert_allclose(mass.acceleration, expected, atol=1e-3)
+
+
+def test_no_thrust_is_larger_than_the_full_one_however_the_vehicle_tilts() -> None:
+    """A vehicle that wants to climb at full thrust while it is tilted climbs less."""
+    mass = PointMass(ARDUPILOT._replace(drag=0.0, square_drag=0.0))
+    mass.restart(HOVER)
+    full = GRAVITY / HOVER_THROTTLE
+    for _ in range(400):
+        mass.advance((0.7 * GRAVITY, -0.4 * GRAVITY, GRAVITY - full), ZERO, DT)
+    north, east, down = mass.acceleration
+    assert math.hypot(north, east, GRAVITY - down) == pytest.approx(full)
+    assert GRAVITY - down < 0.9 * full
 
 
 def climbing(t: float, push: float = 1.0, jerk: float = 3.5) -> Motion:
