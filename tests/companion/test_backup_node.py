@@ -338,12 +338,14 @@ def test_its_farewell_is_accepted_by_the_others_with_which_there_was_an_agreemen
         assert accepted(bench, system, since) is expected
 
 
-def starting(place: tuple[float, float, float], moves: float = 0.0) -> Bench:
-    """A companion that announced its first plan, held ``place``, and ended before this plan began."""
+def starting(place: tuple[float, float, float], height: float | None = None) -> Bench:
+    """A companion that announced its first plan, held ``place``, and ended before this plan began.
+
+    With a ``height`` (m) it is a column, held at that height.
+    """
     bench = Bench()
-    begins = BEGIN + 800_000
-    plan = resting(begins, DT, STEPS, place, FLEET.fingerprint, column=False)
-    bench.plans = [committed(plan, np.full((STEPS, 3), moves))]
+    begins, bench.height = BEGIN + 800_000, height
+    bench.plans = [resting(begins, DT, STEPS, place, FLEET.fingerprint, column=height is not None)]
     assert bench.run(0.3) == []
     said = Statement(
         fingerprint(CONFIG, FLEET), begins, begins, (Entry(12, ((begins, begins),), (begins, begins)),)
@@ -364,6 +366,31 @@ def test_a_first_plan_at_rest_is_held_before_it_begins_and_is_the_last_one() -> 
     assert bench.node.farewell(bench.now) == [], "the plan has not begun by the clocks of all"
     bench.run(1.0)
     assert accepted(bench, 12, BEGIN + 800_000)
+
+
+def test_a_first_column_is_held_at_the_height_of_the_last_set_point_before_it_begins() -> None:
+    bench = starting((1.0, 2.0, 5.0), height=3.5)
+    held = bench.run(1.4)
+    assert held[0][0] < BEGIN + 800_000 < held[-1][0]
+    for _, sent in held:
+        np.testing.assert_allclose(sent.position, (2.0, 1.0, -3.5), atol=1e-3)
+    assert accepted(bench, 12, BEGIN + 800_000)
+
+
+def test_a_first_plan_at_rest_after_an_order_to_land_is_held_before_it_begins() -> None:
+    """The plans of before are discarded, so that it is the earliest one; the vehicle holds its place."""
+    bench = Bench()
+    bench.run(0.5)
+    order = CommandLong(COMPANION, SYSTEM, 1, mavlink.MAV_CMD_NAV_LAND, 0, (0.0,) * 7)
+    begins = BEGIN + 1_300_000
+    bench.plans = [resting(begins, DT, STEPS, (4.0, 2.0, 5.0), FLEET.fingerprint)]
+    bench.node.step(bench.now, [bench.tell("autopilot", order)])
+    assert bench.run(0.3) == []
+    bench.speaks = False
+    held = bench.run(0.4)
+    assert held[-1][0] < begins
+    for _, sent in held:
+        np.testing.assert_allclose(sent.position, (2.0, 4.0, -5.0), atol=1e-3)
 
 
 @pytest.mark.parametrize(("moves", "east"), [(0.5, 0.0), (0.0, 0.5)])
@@ -515,6 +542,27 @@ def test_it_adds_to_the_plan_what_the_companion_adds(profile: Profile) -> None:
     # The drag is known from a second of set-points, and not exactly.
     assert max(added) > 0.5
     assert max(off) < 0.25 * max(added)
+
+
+@pytest.mark.parametrize("profile", [ARDUPILOT, PX4], ids=lambda profile: profile.name)
+def test_another_command_or_origin_of_the_autopilot_discards_nothing_of_what_was_observed(
+    profile: Profile,
+) -> None:
+    """A companion sends commands in flight, and an autopilot its origin whenever it is asked."""
+    results = []
+    for told_more in (False, True):
+        bench = Compensating(profile)
+        bench.run(1.0)
+        if told_more:
+            command = CommandLong(
+                COMPANION, SYSTEM, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, (49.0, *(0.0,) * 6)
+            )
+            origin = GpsGlobalOrigin(AUTOPILOT, *FLEET.to_geodetic(np.zeros(3)), 0)
+            for _ in range(2):
+                bench.node.receive(bench.now, [command, origin])
+        bench.speaks = False
+        results.append(bench.run(0.5))
+    assert results[0] == results[1] != []
 
 
 def test_an_acceleration_that_is_no_number_is_not_continued() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.avoidance.certified.committed import carried_on, horizon_of, rest_time
+from companion.avoidance.certified.committed import carried_on, horizon_of, rest_time, resting
 from companion.avoidance.certified.fingerprint import fingerprint
 from companion.backup.links import BACKUP
 from companion.backup_node import BackupNode
@@ -178,6 +178,27 @@ def test_a_plan_that_has_not_begun_is_not_said_to_be_the_last() -> None:
     assert rig.heard(Tunnel) == []
     rig.run(0.5)
     assert rig.heard(Tunnel)[0][0] >= following.epoch
+
+
+def test_a_companion_that_ends_before_its_first_plan_begins_has_its_place_held_and_told() -> None:
+    """The others may have agreed on that plan: without a farewell those that begin anew wait for ever."""
+    rig = Rig()
+    rig.plan = resting(BEGIN + 800_000, 200_000, 16, (1.0, 2.0, 5.0), FLEET.fingerprint)
+    rig.run(0.3)
+    rig.copies, rig.pilot.gone = False, True
+    rig.run(0.4)
+    held = [message for _, message in rig.heard(SetpointLocal) if isinstance(message, SetpointLocal)]
+    assert held
+    for message in held:
+        np.testing.assert_allclose(message.position, (2.0, 1.0, -5.0), atol=1e-3)
+    assert rig.heard(Tunnel) == [], "the plan has not begun"
+    rig.run(8.0)
+    assert rig.heard(Tunnel)[0][0] >= rig.plan.epoch
+    statements = [
+        m.payload for _, m in rig.heard(Tunnel) if isinstance(m, Tunnel) and m.payload_type == AGREEMENTS
+    ]
+    assert all(unpack_statement(payload).farewell for payload in statements)
+    assert rig.mode == HELD
 
 
 def copied(time: int, swarm: Message) -> Datagram:
