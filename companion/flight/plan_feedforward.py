@@ -7,7 +7,7 @@ a vehicle on its plan with the acceleration a(t) needs the command
     a(t) + R(t),   R(t) = (1 + D) a(t + τ) − a(t) + κ v(t + τ),
 
 where D is the gain of the velocity loop's derivative of the measured velocity (PX4). PX4 takes R as an
-addition to the acceleration of the set-point; its κ v is ``Tracking.compensation``.
+addition to the acceleration of the set-point; its κ v is ``Tracking.compensation``, with all of κ.
 
 ArduPilot does not follow set-points, but a trajectory of bounded jerk that approaches them: it takes an
 addition to the acceleration for an error, and removes it in half a second. It lets pass only what is
@@ -15,9 +15,10 @@ consistent. So the trajectory is moved aside by δ, for which the loop itself co
 
     δ̈ = R − k_v y − k_i ∫y,   y = δ̇ + k_p δ,
 
-with the gains of the position loop (k_p, k_v) and of its integral (k_i). δ fades where the speed is constant.
-The position of the set-point stays on the plan: the addition δ̇ + g δ to the velocity and δ̈ to the
-acceleration move the trajectory by δ, with the gain g of its approach to the position.
+with min(κ, ``LARGEST_DRAG``) in place of κ in R, and the gains of the position loop (k_p, k_v) and of its
+integral (k_i). δ fades where the speed is constant. The position of the set-point stays on the plan: the
+addition δ̇ + g δ to the velocity and δ̈ to the acceleration move the trajectory by δ, with the gain g of its
+approach to the position.
 """
 
 from __future__ import annotations
@@ -78,7 +79,8 @@ class PlanFeedforward:
     def step(self, now: int, plan: Callable[[int], Motion], loop: Loop, drag: float) -> Additions:
         """Return the additions to the set-point at ``now`` (µs); call this for each set-point.
 
-        ``plan`` gives the planned motion at a time (µs), ``drag`` is κ (1/s).
+        ``plan`` gives the planned motion at a time (µs), ``drag`` is κ (1/s); δ is computed with
+        min(κ, ``LARGEST_DRAG``).
         """
         inverse = loop.inverse
         if inverse is None:

@@ -2,8 +2,9 @@
 
 Both firmwares tilt for a wanted acceleration as in hover, by atan(a/g), and keep the vertical part of the
 thrust at the throttle's. So the horizontal acceleration, less drag, is the vertical part of the thrust times
-tan(tilt): less than wanted while the vehicle accelerates downwards, and more while it does upwards. The
-attitude loop is modelled as a second-order lag on each tilt angle; yaw has no effect on a point mass.
+tan(tilt): less than wanted while the vehicle accelerates downwards, and more while it does upwards. Full
+thrust limits the whole: a tilted vehicle has full thrust · cos(tilt) upwards at most. The attitude loop is
+modelled as a second-order lag on each tilt angle; yaw has no effect on a point mass.
 """
 
 from __future__ import annotations
@@ -16,6 +17,12 @@ from sitl.values.setpoints import ZERO
 
 GRAVITY: Final = 9.80665
 
+HOVER_THROTTLE: Final = 0.364
+"""Throttle at which the 3 kg quadrotor of ArduPilot's SITL hovers, as its logs tell (CTUN.ThO).
+
+It is of this frame only: another vehicle's full thrust, and its gain from throttle to acceleration, differ.
+"""
+
 Motion = tuple[Vector, Vector, Vector]
 """Position (m), velocity (m/s), acceleration (m/s²), in one inertial frame, z down."""
 
@@ -26,8 +33,8 @@ class Airframe(NamedTuple):
     ``angle_rate`` 1/s: requested tilt rate per angle of error; ``angle_acceleration`` rad/s²: limit of the
     change of that rate; ``angle_lag`` s: first-order lag from the requested angle to the tilt; ``thrust_lag``
     s: lag of vertical thrust. ``drag`` 1/s and ``square_drag`` 1/m: deceleration per speed, and per square of
-    speed, relative to the air. ``vertical_drag``: whether drag also acts vertically. ``thrust`` m/s²: the
-    largest thrust per mass, along the tilted axis.
+    speed, relative to the air. ``vertical_drag``: whether drag also acts vertically. ``full_thrust`` m/s²:
+    acceleration by all of the thrust.
     """
 
     angle_rate: float
@@ -37,14 +44,9 @@ class Airframe(NamedTuple):
     drag: float
     square_drag: float
     vertical_drag: bool
-    thrust: float = math.inf
+    full_thrust: float
 
 
-HOVER_THROTTLE: Final = 0.364
-"""Throttle at which the 3 kg quadrotor of ArduPilot's SITL hovers, as its logs tell (CTUN.ThO).
-
-AP_Motors makes the thrust proportional to the throttle. Another frame hovers at another throttle.
-"""
 ARDUPILOT: Final = Airframe(
     # ATC_INPUT_TC 0.15 s and ATC_ACCEL_R_MAX 1100 °/s²; the lag represents the attitude and rate loops.
     angle_rate=1.0 / 0.15,
@@ -57,7 +59,8 @@ ARDUPILOT: Final = Airframe(
     drag=0.246,
     square_drag=0.0336,
     vertical_drag=False,
-    thrust=GRAVITY / HOVER_THROTTLE,
+    # AP_Motors makes the thrust proportional to the throttle.
+    full_thrust=GRAVITY / HOVER_THROTTLE,
 )
 PX4: Final = Airframe(
     # MC_ROLL_P; the rate loop is much faster than the angle loop.
@@ -69,6 +72,8 @@ PX4: Final = Airframe(
     drag=1.0,
     square_drag=0.0,
     vertical_drag=True,
+    # Four rotors with SIH_T_MAX 5 N.
+    full_thrust=20.0,
 )
 
 
@@ -88,6 +93,12 @@ class PointMass:
         self._rate = [0.0, 0.0]
         self._tilt = [0.0, 0.0]
         self._vertical_acceleration = 0.0
+
+    @property
+    def highest(self) -> float:
+        """Acceleration (m/s², down; negative is upwards) that full thrust gives at the present tilt."""
+        level = math.hypot(*map(math.tan, self._tilt))
+        return GRAVITY - self._airframe.full_thrust / math.hypot(1.0, level)
 
     def advance(self, wanted: Vector, wind: Vector, dt: float, drift: Vector = (0.0, 0.0, 0.0)) -> None:
         """Advance by ``dt`` seconds towards the acceleration ``wanted`` (m/s², without drag).
@@ -109,16 +120,14 @@ class PointMass:
         )
         north, east, down = (v - w for v, w in zip(self.velocity, wind, strict=True))
         drag, square = frame.drag, frame.square_drag
-        aside = math.tan(self._tilt[0]), math.tan(self._tilt[1])
-        # Rotors do not push downwards, and a tilted vehicle has less than its full thrust upwards.
-        most = frame.thrust / math.hypot(1.0, *aside)
-        self._vertical_acceleration = max(self._vertical_acceleration, GRAVITY - most)
-        lift = max(GRAVITY - self._vertical_acceleration, 0.0)
+        vertical = max(self._vertical_acceleration, self.highest)
+        # Rotors do not push downwards.
+        lift = max(GRAVITY - vertical, 0.0)
         self._integrate(
             (
-                lift * aside[0] - (drag + square * abs(north)) * north,
-                lift * aside[1] - (drag + square * abs(east)) * east,
-                self._vertical_acceleration - (drag * down if frame.vertical_drag else 0.0),
+                lift * math.tan(self._tilt[0]) - (drag + square * abs(north)) * north,
+                lift * math.tan(self._tilt[1]) - (drag + square * abs(east)) * east,
+                vertical - (drag * down if frame.vertical_drag else 0.0),
             ),
             dt,
         )

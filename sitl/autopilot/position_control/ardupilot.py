@@ -96,7 +96,8 @@ class ArduPilotResponse:
         north, east = self._horizontal(dt)
         mass = self._mass
         (_, _, z), (_, _, w), (_, _, c) = self.desired
-        down = self._height.advance((z, w, c), (mass.position[2], mass.velocity[2], mass.acceleration[2]), dt)
+        actual = mass.position[2], mass.velocity[2], mass.acceleration[2]
+        down = self._height.advance((z, w, c), actual, dt, mass.highest)
         self._commanded = (north, east, down)
 
     def _horizontal(self, dt: float) -> Pair:

@@ -2,8 +2,7 @@
 
 The velocity controller asks for an acceleration, and a PI controller of the *measured* acceleration moves the
 throttle from that of hover. So about half of a change of the acceleration comes at once, and the rest within
-a second, as the integral learns it. The integral is bounded by PSC_ACCZ_IMX alone: that of the firmware also
-stops to grow at a limit of the throttle, so this one overshoots more after such a limit.
+a second, as the integral learns it. While the throttle is at a limit, the integral only decreases (AC_PID).
 """
 
 from __future__ import annotations
@@ -17,8 +16,6 @@ from sitl.config.gains import ArduPilotGains, Speeds
 
 _PER_THROTTLE: Final = GRAVITY / HOVER_THROTTLE
 """Acceleration (m/s²) per throttle: AP_Motors makes the thrust proportional to it."""
-_HIGHEST: Final = _PER_THROTTLE - GRAVITY
-"""Upward acceleration (m/s²) at full throttle; without throttle it is −g."""
 _INTEGRAL_MAX: Final = 0.8 * _PER_THROTTLE
 """m/s²: PSC_ACCZ_IMX, 800 thousandths of the throttle."""
 _PSC: Final = 0.1
@@ -42,16 +39,19 @@ class HeightControl:
         self._velocity_error: float | None = None
         self._acceleration_error = 0.0
         self._integral = 0.0
+        self._limited = False
 
     def advance(
         self,
         desired: tuple[float, float, float],
         actual: tuple[float, float, float],
         dt: float,
+        highest: float,
     ) -> float:
         """Advance by ``dt`` seconds; return the acceleration (m/s²) that the throttle gives in the end.
 
-        ``desired`` and ``actual``: position (m), velocity (m/s) and acceleration (m/s²) along z.
+        ``desired`` and ``actual``: position (m), velocity (m/s) and acceleration (m/s²) along z. ``highest``
+        (m/s²): acceleration at full throttle; without throttle it is g.
         """
         gains, speeds = self._gains, self._speeds
         closing = square_root_law(desired[0] - actual[0], gains.position_z, gains.acceleration_z)
@@ -62,9 +62,12 @@ class HeightControl:
         error = gains.velocity_z * velocity_error + desired[2] - actual[2]
         self._acceleration_error += _gain(gains.throttle_filter_hz, dt) * (error - self._acceleration_error)
         error = _PSC * _PER_THROTTLE * self._acceleration_error
-        integral = self._integral + gains.throttle_integral * error * dt
-        self._integral = max(-_INTEGRAL_MAX, min(_INTEGRAL_MAX, integral))
-        return max(-_HIGHEST, min(GRAVITY, gains.throttle * error + self._integral))
+        if not self._limited or self._integral * error < 0.0:
+            integral = self._integral + gains.throttle_integral * error * dt
+            self._integral = max(-_INTEGRAL_MAX, min(_INTEGRAL_MAX, integral))
+        down = gains.throttle * error + self._integral
+        self._limited = not highest < down < GRAVITY
+        return max(highest, min(GRAVITY, down))
 
 
 def _gain(hz: float, dt: float) -> float:

@@ -24,9 +24,11 @@ from sitl.autopilot.position_control.airframe import (
     Motion,
     PointMass,
 )
+from sitl.autopilot.position_control.ardupilot_height import HeightControl
 from sitl.autopilot.position_control.px4 import _within
 from sitl.autopilot.response import Response, response_of
 from sitl.config.autopilot import AutopilotConfig
+from sitl.config.gains import ArduPilotGains, Speeds
 from sitl.values.setpoints import POSITION, Pose, Setpoint
 from tests.sitl.autopilot_rig import FLAVOURS, ZERO, Rig
 
@@ -339,16 +341,39 @@ def test_the_same_tilt_pushes_less_the_less_thrust_there_is(
     np.testing.assert_allclose(mass.acceleration, expected, atol=1e-3)
 
 
-def test_no_thrust_is_larger_than_the_full_one_however_the_vehicle_tilts() -> None:
-    """A vehicle that wants to climb at full thrust while it is tilted climbs less."""
-    mass = PointMass(ARDUPILOT._replace(drag=0.0, square_drag=0.0))
+@pytest.mark.parametrize("airframe", [ARDUPILOT, PX4], ids=["ardupilot", "px4"])
+@given(st.tuples(st.floats(-25.0, 25.0), st.floats(-25.0, 25.0), st.floats(-30.0, 9.0)))
+@settings(max_examples=40)
+def test_thrust_is_full_thrust_at_most_at_any_tilt(
+    airframe: Airframe, wanted: tuple[float, float, float]
+) -> None:
+    mass = PointMass(airframe._replace(drag=0.0, square_drag=0.0, vertical_drag=False))
     mass.restart(HOVER)
-    full = GRAVITY / HOVER_THROTTLE
     for _ in range(400):
-        mass.advance((0.7 * GRAVITY, -0.4 * GRAVITY, GRAVITY - full), ZERO, DT)
-    north, east, down = mass.acceleration
-    assert math.hypot(north, east, GRAVITY - down) == pytest.approx(full)
-    assert GRAVITY - down < 0.9 * full
+        mass.advance(wanted, ZERO, DT)
+        north, east, down = mass.acceleration
+        assert math.hypot(north, east, GRAVITY - down) <= airframe.full_thrust + 1e-9
+    # And all of it is there for one that asks for more upwards.
+    if GRAVITY - wanted[2] > airframe.full_thrust:
+        assert math.hypot(north, east, GRAVITY - down) == pytest.approx(airframe.full_thrust)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_the_integral_of_the_throttle_learns_nothing_at_its_limit(sign: float) -> None:
+    """AC_PID: of a long error at the limit nothing is left, and the throttle leaves it with the error."""
+    highest = GRAVITY - ARDUPILOT.full_thrust
+    after = []
+    for seconds in (1.0, 20.0):
+        height = HeightControl(ArduPilotGains(), Speeds())
+        for _ in range(round(seconds / DT)):
+            down = height.advance((0.0, sign * 50.0, 0.0), (0.0, 0.0, 0.0), DT, highest)
+        assert down == pytest.approx(GRAVITY if sign > 0.0 else highest)
+        for _ in range(200):
+            down = height.advance((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), DT, highest)
+        after.append(down)
+    assert after[1] == pytest.approx(after[0])
+    # An integral that went on would be beyond the limit.
+    assert abs(after[1]) < 0.7 * (GRAVITY if sign > 0.0 else -highest)
 
 
 def climbing(t: float, push: float = 1.0, jerk: float = 3.5) -> Motion:

@@ -18,7 +18,7 @@ from tests.sitl.outside_client import Client, only
 TABLES = {"ardupilot": ardupilot.table(6), "px4": px4.table(6)}
 ALL_BUT_YAW_RATE = 0x800
 UNBOUND = {"filter_hz"}
-"""Gains that are no parameter in the tables: one of two parameters."""
+"""Gains that are no parameter in the tables."""
 REAL32 = 9
 INT16 = 4
 START = (0.0, 0.0, -10.0)
@@ -106,6 +106,15 @@ def test_less_jerk_makes_the_vehicle_follow_a_reversal_later() -> None:
     assert slow[1] > stock[1] + 1.0
     assert quick[0] < stock[0] - 0.1
     assert quick[1] < stock[1] - 0.3
+
+
+def test_slow_filters_of_the_climb_make_it_late() -> None:
+    stock, velocity, throttle = (
+        stepped("ardupilot", values, ABOVE, 1.6)[-1, 2]
+        for values in ({}, {"PSC_VELZ_FLTE": 0.1}, {"PSC_ACCZ_FLTE": 1.0})
+    )
+    assert velocity > stock + 0.05
+    assert abs(throttle - stock) > 0.01
 
 
 def test_with_the_exact_response_it_does_nothing() -> None:
