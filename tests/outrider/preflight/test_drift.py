@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,4 +29,5 @@ def test_only_take_off_and_landing_count_each_from_its_own_beginning(
                 before, begin = phase, here[:2]
             if phase in BY_THE_AUTOPILOT:
                 largest = max(largest or 0.0, float(np.hypot(*(here[:2] - begin))))
-    assert meter.largest == largest
+    # The two roots may differ in the last bit.
+    assert meter.largest == (None if largest is None else pytest.approx(largest, rel=1e-12))
