@@ -62,9 +62,13 @@ def test_a_file_that_does_not_exist_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_start_of_fly_is_measured_in_both_processes() -> None:
-    """The limit of memory holds with every optional package installed."""
+    """The limit of memory holds with every optional package installed.
+
+    It is one of anonymous pages: all together were 185 MiB on one day and 215 on another, on one machine.
+    """
     start.measured()
     figures = start.measured()
     assert figures["cpu_s"] > 0.1
     assert figures["largest_mib"] < 2.0 * figures["memory_mib"]
-    assert 50.0 < figures["memory_mib"] <= 200.0
+    assert 50.0 < figures["anonymous_mib"] <= 110.0
+    assert figures["anonymous_mib"] < figures["memory_mib"]

@@ -52,7 +52,8 @@ def measured() -> dict[str, float]:
 
     ``cpu_s``: CPU time of all processes (s). ``memory_mib``: their resident memory; pages that they share
     count once, that is the anonymous pages of all (Pss_Anon) and the pages of files of the process that has
-    most of them. ``largest_mib``: resident memory (Rss) of the larger process.
+    most of them. ``anonymous_mib``: of it the anonymous pages; how many pages of files are resident depends
+    on what the kernel had read before. ``largest_mib``: resident memory (Rss) of the larger process.
     """
     if not Path("/proc/self/smaps_rollup").exists():
         return {}
@@ -66,6 +67,7 @@ def measured() -> dict[str, float]:
             memory = [_memory(pid) for pid in family]
     return {
         "cpu_s": ticks / os.sysconf("SC_CLK_TCK"),
+        "anonymous_mib": round(sum(one.own for one in memory), 1),
         "memory_mib": round(sum(one.own for one in memory) + max(one.files for one in memory), 1),
         "largest_mib": round(max(one.resident for one in memory), 1),
     }
