@@ -58,7 +58,9 @@ class AnticipationConfig(Settings):
         " or than the vehicle needs to brake from v_max",
     )
     fresh: Positive = Field(
-        0.6, description="s: with agreements on plans that are older on average, that is no limit"
+        0.6,
+        description="s: with agreements on plans that are older on average, a plan aims as far ahead as if"
+        " nobody were met",
     )
     wrong_side: float = Field(
         0.5,

@@ -15,8 +15,8 @@ def way_of(config: CompanionConfig, least: float, effort: int = 1, spare: float 
     """Return the way of a vehicle with ``config``; None where ways are off or there is no fixed obstacle.
 
     ``least`` (m): clearance that a way must have, of which plans need not keep ``spare`` (m). A plan does
-    ``effort`` times ``way.parts`` of a search. The
-    search is loaded only here, because most companions need none.
+    ``effort`` times ``way.parts`` of a search. The search is loaded only here, because most companions need
+    none.
     """
     if config.way is None or not config.obstacles:
         return None

@@ -521,9 +521,6 @@ def test_it_adds_to_the_plan_what_the_companion_adds(profile: Profile) -> None:
     """The first set-points are those that the companion would have sent, and so are the later ones."""
     bench = Compensating(profile)
     assert bench.run(1.0) == []
-    # Another command than that to land says nothing of the plan.
-    order = CommandLong(COMPANION, SYSTEM, 1, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, (0.0,) * 7)
-    bench.node.step(bench.now, [bench.tell("autopilot", order)])
     bench.speaks, since = False, bench.now
     sent = bench.run(2.0)
     wanted = {now: bench.motion(now) for now in range(since, bench.now, TICK)}

@@ -65,10 +65,11 @@ def measured() -> dict[str, float]:
             family = [process.pid, *_children(process.pid)]
             ticks = sum(_ticks(pid) for pid in family)
             memory = [_memory(pid) for pid in family]
+    anonymous = sum(one.own for one in memory)
     return {
         "cpu_s": ticks / os.sysconf("SC_CLK_TCK"),
-        "anonymous_mib": round(sum(one.own for one in memory), 1),
-        "memory_mib": round(sum(one.own for one in memory) + max(one.files for one in memory), 1),
+        "anonymous_mib": round(anonymous, 1),
+        "memory_mib": round(anonymous + max(one.files for one in memory), 1),
         "largest_mib": round(max(one.resident for one in memory), 1),
     }
 
