@@ -93,7 +93,7 @@ class Companion:
         self._planning = Planning(config, world, pilot, self._goals, self.avoidance)
         self._setpoints = Setpoints(config, own, pilot, self.avoidance, self._planning)
         self._sharing = Sharing(config, own, fleet)
-        self.round_trips = RoundTrips(own)
+        self.round_trips = RoundTrips(own, regular=world.cameras is not None)
         self.reporter = StatusReporter(config.ground_messages, own)
         self._checks = HealthChecks(
             config,

@@ -13,6 +13,11 @@ line is raised to this offset plus the least delay at once; as long as answers a
 raises it. A message's age is then never understated, and overstated by no more than the time that the request
 took.
 
+Answers also measure the least delay. The offset lies between that of the answers and that of the lags, so
+half of the difference between the two is the delay of each way, if both take equally long, and wrong by no
+more than this half if not (as in D. L. Mills, Network Time Protocol, RFC 5905, section 8). ``reads`` uses it
+in place of the setting: an image of a camera must be dated neither too early nor too late.
+
 Without answers, two explanations are accepted after long evidence. First, a lag that has changed steadily for
 half a minute is attributed to a clock of another rate, such as a simulator's (1 % and more); the rate is that
 of the line below the lags as defined by Moon, Skelly and Towsley ("Estimation and removal of clock skew from
@@ -61,7 +66,7 @@ The messages of a queue that drains have a smaller one.
 _LAST_LAGS = 8
 """Number of last lags kept, for ``late``, for ``answered`` and for the line of a ``brief`` clock."""
 _ANSWER_VALID_US = 10 * _SECOND_US
-"""Time after an answer during which the lags cannot raise the line."""
+"""Time after an answer during which the lags cannot raise the line, and the answers measure the delay."""
 _MAX_REPEATS = 4
 """Number of repetitions of one stamp, over at least a second, after which the clock counts as stopped.
 
@@ -104,6 +109,7 @@ class SenderClock:
 
     __slots__ = (
         "_answered",
+        "_asked",
         "_base",
         "_begun",
         "_delay",
@@ -137,6 +143,8 @@ class SenderClock:
         self.lost = 0
         self._lag = 0
         self._answered: int | None = None
+        # Offset by the best of the last answers, a lower bound, as of the last answer.
+        self._asked = 0.0
         # A ring; its order has no meaning.
         self._last_lags: list[int] = []
         self._delay = delay
@@ -209,9 +217,19 @@ class SenderClock:
         The message arrived at ``received`` with ``stamp`` (0: none). The estimate of the clock does not
         change.
         """
+        delay = self._delay if self._base is None else self._measured_delay(received)
         if stamp <= 0 or self._base is None:
-            return received - self._delay
-        return min(stamp + self._base + self.skew, received - self._delay)
+            return received - delay
+        return min(stamp + self._base + self.skew + self._delay - delay, received - delay)
+
+    def _measured_delay(self, now: int) -> int:
+        """Return the least delay (µs) of messages at ``now``, by the answers, or as set without any."""
+        answered = self._answered
+        if answered is None or not 0 <= now - answered < _ANSWER_VALID_US or self._base is None:
+            return self._delay
+        both_ways = self._line - (self._asked - _DRIFT * (now - answered))
+        # Bounds that contradict each other are of a clock that was set in between.
+        return round(0.5 * both_ways) if both_ways >= 0.0 else self._delay
 
     def ahead(self, received: int, stamp: int) -> int:
         """Return by how much (µs) ``stamp`` is later than a message that arrived at ``received`` can be.
@@ -240,7 +258,7 @@ class SenderClock:
             return
         if abs(received - stamp - self._lag) > self._tolerance:
             return
-        self._answered = received
+        self._hear(received, float(asked - stamp))
         received = max(received, self._received)
         line = self._line + self._rate * (received - self._received)
         # A message dated by this line gets the age that it would have if the request had taken no time: the
@@ -252,6 +270,18 @@ class SenderClock:
             self._received, self._line, self._rate = received, float(least), _DRIFT
             self._forget()
             self.skew = least - self._delay - self._base
+
+    def _hear(self, received: int, offset: float) -> None:
+        """Keep the larger of ``offset``, a lower bound (µs), and of the last one, which drift has lowered.
+
+        The last one does not count above the line: the sender's clock was set forward since.
+        """
+        before = self._answered
+        if before is not None and 0 <= received - before < _ANSWER_VALID_US:
+            last = self._asked - _DRIFT * (received - before)
+            if offset < last <= self._line:
+                offset = last
+        self._answered, self._asked = received, offset
 
     def _forget(self) -> None:
         """Discard the lags so far: they belong to another line."""

@@ -41,11 +41,13 @@ class Answer(NamedTuple):
 class RoundTrips:
     """TIMESYNC exchange between the companion ``own`` and the autopilot of its system.
 
-    ``always``: requests are sent although messages arrive as expected.
+    ``regular``: requests are sent although messages arrive as expected, because images are dated by the
+    answers. ``always``: the same, and may change.
     """
 
-    def __init__(self, own: Source) -> None:
+    def __init__(self, own: Source, *, regular: bool = False) -> None:
         self._own = own
+        self._regular = regular
         self.always = False
         self.requested = 0
         """Own time (µs) of the last request; 0 before the first."""
@@ -59,7 +61,7 @@ class RoundTrips:
         """Return the request due at ``now`` (µs), if any; ``late`` (µs): ``SenderClock.late``."""
         if late <= _LATE_US:
             self._since = None
-            if not self.always:
+            if not (self.always or self._regular):
                 return []
         if now < self._next:
             return []
