@@ -1,8 +1,10 @@
 """Negotiation of agreements with one peer: what is taken, what is proposed, and what is refused.
 
-The vehicle with the lower id of a pair leads. It proposes an agreement on the newest plans that it holds, and
-the other takes it if its newest plan still keeps it. Where both hold the two plans of one epoch, both propose
-the same agreement at once, which saves a message. If each proposed another one, it would bar the other's.
+Both vehicles of a pair propose the same agreement, on their plans of one epoch, each as soon as it holds both
+plans. So the proposal of the peer is the answer to the own one, and an agreement is known to be taken after
+two delays of a message: one of the plan, and one of the proposal. If each proposed another one, it would bar
+the other's. Where messages are late, the newest own plan is later than that of the agreement, and must keep
+it.
 """
 
 from __future__ import annotations
@@ -85,10 +87,10 @@ class Negotiation:
                 peer.agree(one, made(*plans, self._geometry.agreed))
                 break
             refused = refused or one
-        other = peer.plans.before(epoch)
-        if other is not None and self._worthwhile(now, peer, AgreedPlans(newest, other)):
-            planes = made(newest, other, self._geometry.agreed)
-            peer.propose(now, Agreement(epoch, other.plan.epoch), planes)
+        other, common = peer.plans.before(epoch), self._common(peer, newest, since)
+        if common is not None and self._worthwhile(now, peer, newest, common):
+            planes = made(*common, self._geometry.agreed)
+            peer.propose(now, Agreement(common.own.plan.epoch, common.other.plan.epoch), planes)
         elif refused is not None and pair.newer(refused, pair.considered):
             pair.refuse(refused)
             peer.changed = True
@@ -100,6 +102,19 @@ class Negotiation:
             waiting, patience = peer.waiting(now), _OVERDUE * peer.round_trip
             left = inf if waiting is None or waiting > patience else patience - waiting
             peer.settled, peer.settled_until = newest, now + left
+
+    def _common(self, peer: Peer, newest: StoredPlan, since: int) -> AgreedPlans | None:
+        """Return the plans of both of the last epoch from ``since`` (µs) to the ``newest`` plan's.
+
+        It is the last one of which both are filed; None without one.
+        """
+        epoch = newest.plan.epoch
+        while (other := peer.plans.before(epoch)) is not None and other.plan.epoch >= since:
+            own = self._plans.get(other.plan.epoch)
+            if own is not None:
+                return AgreedPlans(own, other)
+            epoch = other.plan.epoch - 1
+        return None
 
     def plans_of(self, peer: Peer, one: Agreement) -> AgreedPlans | None:
         """Return the two plans of an agreement; None if one is not filed."""
@@ -115,13 +130,17 @@ class Negotiation:
         agreed, newest = self.plans_of(peer, peer.pair.kept[0]), self.plans_of(peer, Agreement(epoch, epoch))
         return agreed is not None and newest is not None and self._same(agreed, newest)
 
-    def _worthwhile(self, now: int, peer: Peer, plans: AgreedPlans) -> bool:
-        """Return whether an agreement on these newest plans of both is to be proposed."""
+    def _worthwhile(self, now: int, peer: Peer, newest: StoredPlan, plans: AgreedPlans) -> bool:
+        """Return whether an agreement on these ``plans`` of one epoch is to be proposed.
+
+        The ``newest`` own plan must keep it, as where it is taken.
+        """
         pair = peer.pair
         one = Agreement(plans.own.plan.epoch, plans.other.plan.epoch)
         if not pair.may_take(one) or len(pair.kept) >= _MOST_KEPT:
             return False
-        if not pair.leads and one.own != one.other:
+        if any(kept.epoch > one.epoch for kept in pair.kept):
+            # The planes of an agreement say nothing of times before its later plan.
             return False
         if pair.kept:
             last = self.plans_of(peer, pair.kept[-1])
@@ -130,7 +149,10 @@ class Negotiation:
         waiting = peer.waiting(now)
         if waiting is not None and waiting <= _OVERDUE * peer.round_trip:
             return False
-        return self._apart(peer, plans) and self._reservable(newest=plans.own, plans=plans)
+        if not (self._apart(peer, plans) and self._reservable(newest, plans)):
+            return False
+        # A plan keeps the agreements that it is part of.
+        return plans.own is newest or self._taken_in_time(newest, one, plans)
 
     def _reservable(self, newest: StoredPlan, plans: AgreedPlans) -> bool:
         """Return whether columns permit an agreement on these plans.
@@ -168,17 +190,20 @@ class Negotiation:
         return flown is None or begins >= epoch or self._kept(flown, plans, begins)
 
     def _apart(self, peer: Peer, plans: AgreedPlans) -> bool:
-        """Return whether the newest plans of both are as far apart as the confirmed agreement demands.
+        """Return whether plans of one epoch are as far apart as the confirmed agreement demands.
 
-        The own plan keeps that agreement. A plan that the peer made before it took the agreement may not, and
-        planes between two near plans would keep only their distance.
+        A plan that either made before it took that agreement may not keep it, and planes between two near
+        plans would keep only their distance.
         """
         confirmed = peer.pair.confirmed
         epoch = plans.own.plan.epoch
         if confirmed is None:
             return self._unambiguous(peer, plans, epoch)
         before = self.plans_of(peer, confirmed)
-        return before is not None and self._kept(plans.other, AgreedPlans(before.other, before.own), epoch)
+        if before is None:
+            return False
+        own_keeps = plans.own is self._plans.newest or self._kept(plans.own, before, epoch)
+        return own_keeps and self._kept(plans.other, AgreedPlans(before.other, before.own), epoch)
 
     def _unambiguous(self, peer: Peer, plans: AgreedPlans, epoch: int) -> bool:
         """Return whether two plans may be the first ones agreed on.

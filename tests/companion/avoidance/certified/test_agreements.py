@@ -154,7 +154,10 @@ def test_changes_are_stated_once() -> None:
     assert two.first.entries(every=False) == ()
     two.make(OWN, plan(1, x=0.1))
     two.first.update(NOW)
+    assert not two.first.changed
+    two.first.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, x=4.0)))
+    two.first.update(NOW + LENGTH)
     assert two.first.changed
     (entry,) = two.first.entries(every=False)
-    assert entry.agreements[-1] == (epoch(1), EPOCH)
+    assert entry.agreements[-1] == (epoch(1), epoch(1))
     assert not two.first.changed
