@@ -192,7 +192,10 @@ class Commitment:
         state = State(own[0, 0], start.velocity_m_s, self._last_acceleration(), flown)
         box = None
         if self._sides is not None:
-            box = region(own, goal.place, self._sides - 2.0 * self._rounding.max())
+            # A goal that is turned back would be out of a box that lies towards the goal.
+            aim = objective.places[-1]
+            turned_back = float((aim - own[0, 0]) @ (goal.place - own[0, 0])) < 0.0
+            box = region(own, aim if turned_back else goal.place, self._sides - 2.0 * self._rounding.max())
         # Rounding may violate a plane that is only just kept: the second attempt adds the rounding error, and
         # where that leaves no plan, the first rounded one is mended.
         reason, rounded = HoldReason.UNSOLVED, None

@@ -84,6 +84,24 @@ def test_what_is_told_for_an_epoch_is_flown_in_it(ways: list[str], seed: int) ->
         assert carried_on(announced[before], knots).velocity == announced[after].velocity
 
 
+@given(seeds)
+def test_a_plan_of_limited_length_goes_where_a_goal_is_turned_back_to(seed: int) -> None:
+    """It is the plan of a vehicle whose goal lies there."""
+    rng = np.random.default_rng(seed)
+    aim, goal = rng.normal(scale=3.0, size=(2, 3))
+    if aim @ goal >= 0.0:
+        goal = -goal
+    made = []
+    for place in (HERE + goal, HERE + aim):
+        program, turn = SeparationQp(STEPS, LimitsConfig(), CONFIG), DeadlockTurn(CONFIG.deadlock)
+        kept = Commitment(CONFIG, program, turn, 7, sides=np.array([2.0, 2.0, 0.5]))
+        kept.begin(EPOCH, HERE)
+        kept.turn(EPOCH + 2 * LENGTH)
+        assert kept.replan(towards(HERE + aim), Subgoal(place, 0.0), NOBODY)
+        made.append(kept.announced())
+    assert made[0] == made[1]
+
+
 def test_the_horizon_is_this_plan_and_then_the_next() -> None:
     kept = commitment()
     replan(kept, HERE + vector(4.0, 2.0, 1.0))

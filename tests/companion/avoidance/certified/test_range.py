@@ -244,6 +244,18 @@ def test_a_fleet_with_a_range_stays_apart_and_arrives(loss: float) -> None:
     assert any(len(one.members) < 2 for one in parted)
 
 
+def test_four_that_meet_in_two_lines_turn_back_and_arrive() -> None:
+    """Two that stand head on have their goals turned back, where boxes towards the goals have no room."""
+    starts = np.array([(x, y, 5.0) for x in (-5.0, 5.0) for y in (-0.6, 0.6)])
+    goals = starts * (-1.0, -1.0, 1.0)
+    rough, habits = Rough(0.0, 20_000), [Habits()] * 4
+    swarm = Swarm(starts, rough, habits, 1, strangers=True, planar=True, settings=FLOWN, v_max=V_MAX)
+    swarm.run(17_000_000, lambda _since, system: goals[system - 1])
+    assert swarm.least() >= swarm.d - EXACT
+    ends = [vehicle.flight.commitment.own()[-1, 2] for vehicle in swarm.vehicles]
+    np.testing.assert_allclose(ends, goals, atol=0.1)
+
+
 LOW = {**FLOWN, "range": 4.0}
 """For vehicles that fly so slowly that they may stop in short plans, one high above another."""
 SLOW = (0.4, 0.4, 0.4)
