@@ -138,3 +138,32 @@ def test_faults_are_refused_before_anything_flies(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="did you mean 'rmader'"):
         compare("rmade", out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_goal_in_an_obstacle_of_a_world_file_is_refused_before_anything_flies(tmp_path: Path) -> None:
+    """Each file that the seeds fly is checked, not only the first, and named."""
+    worlds = tmp_path / "worlds"
+    worlds.mkdir()
+    (worlds / "maze1.csv").write_text("2,2,1,1,1,2\n", encoding="utf-8")
+    # Vehicle 12 has its goal at (7, 2, 1).
+    (worlds / "maze2.csv").write_text("7,2,1,0.2,0.2,2\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"seed 2, maze2\.csv: vehicle \d+ .* inside obstacles\[0\], a box"):
+        compare("maze-sparse", 2, worlds=worlds, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    run = f"{__name__}:fly"
+    assert compare("maze-sparse", 1, 1, tmp_path / "out", as_json=True, worlds=worlds, run=run) == 0
+
+
+def test_starts_of_a_mission_file_that_overlap_are_refused_before_anything_flies(tmp_path: Path) -> None:
+    """In the measure of the scene, in which 0.5 m of height are as much as 0.25 m across."""
+    missions = tmp_path / "missions"
+    missions.mkdir()
+    for number, height in ((1, 1.6), (2, 1.5)):
+        ends = [[0.1 * k, 0.5 * k, 0.5] for k in range(-4, 4)] + [[1, 1, 1.0], [1, 1, height]]
+        agents = [{"start": end, "goal": [-end[0], -end[1], end[2]]} for end in ends]
+        path = missions / f"multi_{number}.json"
+        path.write_text(json.dumps({"agents": agents}, indent=1), encoding="utf-8")
+    what = r"multi_2\.json:\d+:\d+: agents\.9\.start is 0\.25 m from agents\.8\.start"
+    with pytest.raises(InputError, match=what):
+        compare("lsc-empty", 2, rows=("10 ",), missions=missions, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()

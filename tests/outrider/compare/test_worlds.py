@@ -159,7 +159,10 @@ def test_world_files_are_flown_in_the_order_of_their_numbers(tmp_path: Path) -> 
     for number in (10, 2):
         box = Box(kind="box", at=(0.0, 0.25 * number, 1.0), size=(0.5, 0.5, 2.0))
         write_world(tmp_path / f"maze{number}.csv", [box])
-    assert [len(world) for world in folder_of(tmp_path)] == [1, 1]
+    assert [(name, len(world)) for name, world in folder_of(tmp_path).items()] == [
+        ("maze2.csv", 1),
+        ("maze10.csv", 1),
+    ]
     of = scene("maze-sparse", worlds=tmp_path)
     assert [scenario_of(of, seed).obstacles[0].at[1] for seed in SEEDS] == [0.5, 2.5, 0.5]
     (tmp_path / "maze3.csv").write_text("1,2,3,4,nan,6\n", encoding="utf-8")

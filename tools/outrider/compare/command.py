@@ -66,11 +66,12 @@ def compare(
     rows_of = comparison.rows if missions is None and worlds is None else chosen
     # In full physics some rows may be too narrow: those that are not asked for are not checked.
     needed = {row.label for row in chosen} if physics else None
-    every = cells_of(comparison, path, rows_of, missions, worlds, needed)
+    count = seeds or comparison.seeds
+    every = cells_of(comparison, path, rows_of, missions, worlds, needed, count)
     cells = {cell.label: cell for cell in every}
     title = f"compare-{comparison.name}"
     folder = places.prepare(out, title)
-    numbers = range(TRACED, TRACED + (seeds or comparison.seeds))
+    numbers = range(TRACED, TRACED + count)
     entries = flown(header(title, every), [cells[row.label] for row in chosen], numbers, folder, run, jobs)
     if entries is None:
         return INTERRUPTED

@@ -1,24 +1,15 @@
-"""Starts and goals of a flight: drawn at random for a seed, or read from mission files of LSC's planners.
-
-A mission file is JSON with a list ``agents``, each with ``start`` and ``goal`` (x, y, z, m). ``quadrotors``,
-``world`` and ``obstacles`` of the file are not read, because the comparison has the limits and the box.
-"""
+"""Starts and goals of a flight, drawn at random for a seed."""
 
 from __future__ import annotations
 
-import json
-import re
-from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from outrider.compare.comparison import Measure, Missions
 from outrider.compare.measures import scaled
-from outrider.errors import Fault, InputError
-from outrider.scenarios.part import Position
+from outrider.errors import InputError
 from outrider.scenarios.streams import Stream, stream
 
 Array = NDArray[np.float64]
@@ -26,7 +17,6 @@ _ROUNDS, _BATCH = 400, 64
 """Number of batches of candidates after which a draw begins anew, and candidates in a batch."""
 _ATTEMPTS = 60
 """Number of draws, each from its own start, until there is no room."""
-_MOST_BYTES = 4_000_000
 
 
 class Mission(NamedTuple):
@@ -34,17 +24,6 @@ class Mission(NamedTuple):
 
     starts: Array
     goals: Array
-
-
-class _Agent(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
-    start: Position
-    goal: Position
-
-
-class _File(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
-    agents: Annotated[tuple[_Agent, ...], Field(min_length=1, max_length=244)]
 
 
 def drawn(missions: Missions, measure: Measure, count: int, seed: int) -> Mission:
@@ -86,48 +65,3 @@ def _scatter(
         f"seed {seed}: there is no room for {count} {what} {missions.apart:g} m apart in {sides} m; allowed:"
         " fewer vehicles, or less apart"
     )
-
-
-def folder_of(path: Path, count: int, offset: Position = (0.0, 0.0, 0.0)) -> list[Mission]:
-    """Return the missions of ``count`` vehicles in ``path``, in the order of the numbers in their names.
-
-    The files are in ``path`` or below it. ``offset`` (m) is added to all places. Raises
-    InputError for a file that is no mission, and without any.
-    """
-    if not path.is_dir():
-        raise InputError(f"--missions {path}: there is no such folder")
-    files = sorted(path.rglob("*.json"), key=lambda file: _numbers(str(file.relative_to(path))))
-    found = [mission for file in files if len((mission := read(file)).starts) == count]
-    if not found:
-        raise InputError(f"--missions {path}: {len(files)} files, but none has {count} vehicles")
-    return [Mission(one.starts + offset, one.goals + offset) for one in found]
-
-
-def read(path: Path) -> Mission:
-    """Return the mission of a file. Raises InputError with the place of the first fault."""
-    try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{path}: more than {_MOST_BYTES} bytes; no mission is as large")
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
-    try:
-        document = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
-        line = getattr(error, "lineno", 1)
-        raise InputError(
-            f"{path}:{line}:{getattr(error, 'colno', 1)}: no JSON: {getattr(error, 'msg', error)}"
-        ) from None
-    except ValueError as error:
-        raise InputError(f"{path}: no JSON: {error}") from None
-    try:
-        agents = _File.model_validate(document).agents
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(Fault(str(path), f"{where or 'the file'}: {first['msg']}")) from None
-    return Mission(np.array([one.start for one in agents]), np.array([one.goal for one in agents]))
-
-
-def _numbers(name: str) -> tuple[list[int], str]:
-    return [int(digits) for digits in re.findall(r"\d+", name)], name

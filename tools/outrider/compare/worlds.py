@@ -53,8 +53,8 @@ def drawn(world: World, starts: Array, goals: Array, limits: LimitsConfig, seed:
     )
 
 
-def folder_of(path: Path) -> list[list[Obstacle]]:
-    """Return the worlds of the files ``*.csv`` in ``path``, in the order of the numbers in their names.
+def folder_of(path: Path) -> dict[str, list[Obstacle]]:
+    """Return the worlds of the files ``*.csv`` in ``path`` by name, in the order of the numbers in these.
 
     Raises InputError for a file that is no world, and without any.
     """
@@ -65,7 +65,7 @@ def folder_of(path: Path) -> list[list[Obstacle]]:
     )
     if not files:
         raise InputError(f"--worlds {path}: there is no file *.csv")
-    return [list(read_world(file)) for file in files]
+    return {file.name: list(read_world(file)) for file in files}
 
 
 def _forest(world: Forest, ends: Array, random: np.random.Generator) -> list[Obstacle] | None:
