@@ -8,10 +8,13 @@ from operator import attrgetter
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as dialect
 
+from mavlink_bridge.messages import ParamValue
+from mavlink_bridge.wire import param_value
+from mavlink_bridge.wire.codec import Codec
 from sitl.autopilot.parameters import ardupilot, px4
 from sitl.autopilot.parameters.parameter import Kind, Parameter
 from sitl.autopilot.parameters.values import Values
@@ -26,22 +29,23 @@ BOUND = {"ardupilot": ardupilot.BOUND, "px4": px4.BOUND}
 INTEGERS = {2: "<b", 4: "<h", 6: "<i"}
 
 
+class BytewiseSetting(dialect.MAVLink_param_set_message):
+    """PARAM_SET with the bytes of an integer; as a float it would lose a bit if it is a signalling NaN."""
+
+    unpacker = struct.Struct("<iBB16sB")
+
+
 def number_of(message: Any, flavour: str) -> float:
     """What PARAM_VALUE says, read as QGroundControl reads PX4 (a union) and ArduPilot (a cast)."""
     if flavour == "px4" and message.param_type == 6:
-        return struct.unpack("<i", struct.pack("<f", message.param_value))[0]
+        return struct.unpack("<i", message.get_msgbuf()[10:14])[0]
     return message.param_value
 
 
-def field(value: float, kind: int, flavour: str) -> float:
-    """A value as a client puts it into PARAM_SET."""
-    if flavour == "px4" and kind == 6:
-        return struct.unpack("<f", struct.pack("<i", int(value)))[0]
-    return float(value)
-
-
 def setting(name: str, value: float, kind: int, flavour: str) -> Any:
-    return dialect.MAVLink_param_set_message(11, 1, name.encode(), field(value, kind, flavour), kind)
+    if flavour == "px4" and kind == 6:
+        return BytewiseSetting(11, 1, name.encode(), int(value), kind)
+    return dialect.MAVLink_param_set_message(11, 1, name.encode(), float(value), kind)
 
 
 def read(name: str, index: int = -1) -> Any:
@@ -141,19 +145,18 @@ def test_what_is_set_is_echoed_read_back_and_kept(flavour, data):
 
 @settings(max_examples=40, deadline=None)
 @given(value=st.integers(-(2**31), 2**31 - 1))
+@example(-4194305)
+@example(0x7F800001)
 def test_px4_integers_survive_whatever_float_they_look_like(value):
-    """Also those whose bytes are a signalling NaN."""
-    rig = Rig("px4")
-    frame = bytearray(setting("CAL_ACC0_ID", 0, 6, "px4").pack(dialect.MAVLink(None, 255, 190)))
-    payload = struct.pack("<iBB16sB", value, 11, 1, b"CAL_ACC0_ID", 6)
-    frame[10:-2] = payload
-    frame[1] = len(payload)
-    crc = dialect.x25crc(frame[1:-2])
-    crc.accumulate(bytes((dialect.MAVLink_param_set_message.crc_extra,)))
-    frame[-2:] = struct.pack("<H", crc.crc)
-    rig.step_bytes(bytes(frame))
-    (raw,) = [f[10:14] for f in frames_of(rig.bytes) if f[7] == 22 and f[18:29] == b"CAL_ACC0_ID"]
-    assert struct.unpack("<i", raw) == (value,)
+    """Also those whose bytes are a signalling NaN, as -4194305 (0xFFBFFFFF): in the simulation and as the
+    companion reads them."""
+    client = Client(Rig("px4"))
+    echo = only(client.send(setting("CAL_ACC0_ID", value, 6, "px4")), "PARAM_VALUE")
+    again = only(client.send(read("CAL_ACC0_ID")), "PARAM_VALUE")
+    assert number_of(echo, "px4") == number_of(again, "px4") == value
+    (decoded,) = Codec().feed(bytes(again.get_msgbuf()))
+    assert isinstance(decoded, ParamValue)
+    assert param_value.number_of(decoded, bytewise=True) == value
 
 
 def frames_of(data: bytes) -> list[bytes]:
