@@ -33,9 +33,12 @@ class SensorProfile(BaseModel):
     drift_onset: Time = Field(
         2.0, description="how fast the wandering may turn: the filter's own time constant (s)"
     )
-    drift_reported: bool = Field(
-        True, description="whether the velocity carries the wandering; if not, the two contradict each other"
+    horizontal_pull: Size = Field(
+        0.0,
+        description="rate at which the filter pulls north and east back against the velocity (1/s): the"
+        " velocity is wrong by the wandering's rate and by its size times this",
     )
+    vertical_pull: Size = Field(0.0, description="the same of down (1/s)")
     position_white: Size = Field(0.0, description="σ of what no sample shares with the next, each axis (m)")
     velocity: Size = Field(
         0.0, description="σ of the velocity beyond the wandering's own, each axis (m/s); Doppler"
@@ -117,14 +120,15 @@ PROFILES: Final[dict[ProfileName, SensorProfile]] = {
         delay=10_000,
         gaps_per_minute=3.0,
     ),
-    # PX4 1.16.1's EKF2 in its simulation SIH, after recorded flights of ten vehicles: its position wanders by
-    # 0.4 m, at 0.23 m/s, within seconds; the velocity is nearly true.
+    # PX4 1.16.1's EKF2 in its simulation SIH, after recorded flights of five vehicles: its velocity is off by
+    # 0.1 to 0.3 m/s for seconds, and its position by as much in 0.5 to 0.9 s (1.2 to 1.7 s vertically).
     "sih": SensorProfile(
-        horizontal_drift=0.4,
-        vertical_drift=0.3,
+        horizontal_drift=0.2,
+        vertical_drift=0.4,
         drift_time=4.0,
-        drift_onset=0.75,
-        drift_reported=False,
+        drift_onset=1.3,
+        horizontal_pull=1.3,
+        vertical_pull=0.5,
         position_white=0.005,
         velocity=0.03,
         tilt=math.radians(0.5),

@@ -1,8 +1,9 @@
 """Random errors of an estimate, per sample of the estimator's clock of 100 Hz.
 
 The slow error of the position is a two-pole Gauss–Markov process, which has a rate of change. The velocity
-error contains this rate, consistent with the position error, unless the profile excludes it. Reading the
-errors does not advance them.
+error contains this rate, consistent with the position error. A filter that pulls its position back to the
+measured one moves it against its velocity: e' = v − k e for the errors e and v, so v contains k e, too.
+Reading the errors does not advance them.
 """
 
 from __future__ import annotations
@@ -32,8 +33,7 @@ class Errors(NamedTuple):
     """Estimate minus truth.
 
     Position (m) and velocity (m/s) in local NED, roll, pitch and yaw (rad), body rates (rad/s, FRD).
-    ``drift``: rate of change (m/s, local NED) of the slow position error, where the velocity error does not
-    contain it; else zero.
+    ``drift``: rate (m/s, local NED) at which the position moves more than the velocity says, −k e.
     """
 
     position: Vector
@@ -60,9 +60,8 @@ class RandomErrors:
         self._gain = np.array([step.gain for step in steps])
         drift = np.array([p.horizontal_drift, p.horizontal_drift, p.vertical_drift])
         self._drift = drift
-        speed = drift / np.sqrt(p.drift_time * p.drift_onset)
-        self._reported: Array = speed if p.drift_reported else np.zeros(3)
-        self._not_reported: Array = speed - self._reported
+        self._speed = drift / np.sqrt(p.drift_time * p.drift_onset)
+        self._pull = drift * np.array([p.horizontal_pull, p.horizontal_pull, p.vertical_pull])
         self._sizes = np.array([p.velocity] * 3 + [p.tilt] * 2 + [p.yaw] + [p.rate_bias] * 3)
         self._white = np.array([p.position_white] * 3 + [p.rate_white] * 3)
         self._random = random
@@ -97,12 +96,13 @@ class RandomErrors:
             self._biases = self._decay * self._biases + bias_noise[k]
         biases *= self._sizes
         white = self._white * draws[:, -6:]
+        pulled = self._pull * walks[:, 0]
         return np.hstack(
             [
                 self._drift * walks[:, 0] + white[:, :3],
-                self._reported * walks[:, 1] + biases[:, :3],
+                self._speed * walks[:, 1] + pulled + biases[:, :3],
                 biases[:, 3:6],
                 biases[:, 6:] + white[:, 3:],
-                self._not_reported * walks[:, 1],
+                -pulled,
             ]
         )

@@ -99,10 +99,7 @@ class Sensors:
 
     @property
     def drift(self) -> Vector:
-        """Rate of change (m/s, local NED) of the slow random position error.
-
-        Zero if the estimated velocity contains this rate.
-        """
+        """Rate (m/s, local NED) at which the estimated position moves more than its velocity says."""
         return self._errors.drift
 
     def silent(self, now: int) -> bool:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from benchmarks.recorded_swarms import at_times, read_swarm
 from sitl.environment.noise import one_pole, two_poles
 from sitl.estimation.profiles import PROFILES, SensorProfile
 from sitl.estimation.random_errors import PERIOD, RandomErrors
 
+FLIGHTS = Path(__file__).parents[2] / "data" / "flights"
 SHARES = st.floats(1e-4, 20.0)
 NOISY = [PROFILES["rtk"], PROFILES["gnss"]]
 SECOND = 1_000_000 // PERIOD
@@ -100,8 +104,8 @@ def test_the_velocity_says_where_the_position_goes():
     assert np.std(change - walked) < 0.7 * np.std(change)
 
 
-def test_a_simulations_velocity_says_nothing_of_where_the_position_wanders():
-    """And what it does not say is told to the position controller."""
+def test_a_simulations_position_moves_by_its_velocity_and_the_drift():
+    """The position controller is told what the velocity does not say: the pull of the filter."""
     random_errors, rows = RandomErrors(PROFILES["sih"], np.random.default_rng(3)), []
     for sample in range(60 * SECOND):
         random_errors.advance(sample)
@@ -109,10 +113,42 @@ def test_a_simulations_velocity_says_nothing_of_where_the_position_wanders():
         rows.append((*e.position, *e.velocity, *e.drift))
     place, velocity, drift = np.split(np.array(rows), 3, axis=1)
     moved = np.diff(place[::SECOND], axis=0)
-    walked = np.add.reduceat(drift, np.arange(0, len(drift), SECOND), axis=0)[:-1] / SECOND
-    assert np.corrcoef(moved.ravel(), walked.ravel())[0, 1] > 0.95
-    assert abs(np.corrcoef(velocity.ravel(), drift.ravel())[0, 1]) < 0.2
-    assert np.std(drift[:, :2]) == pytest.approx(0.4 / math.sqrt(3.0), rel=0.25)
+    said, unsaid = (
+        np.add.reduceat(rate, np.arange(0, len(rate), SECOND), axis=0)[:-1] / SECOND
+        for rate in (velocity, drift)
+    )
+    assert np.corrcoef(moved.ravel(), (said + unsaid).ravel())[0, 1] > 0.95
+    assert np.corrcoef(velocity.ravel(), drift.ravel())[0, 1] < -0.7
+
+
+def test_a_simulations_errors_are_those_of_recorded_flights():
+    """Two PX4s in SIH: position and velocity are wrong together, both for seconds."""
+    ratios = []
+    flown = [v for v in read_swarm(FLIGHTS / "mixed-3-2.npz") if v.flavour == "px4"]
+    ours = long_errors(PROFILES["sih"])
+    for vehicle in flown:
+        times = np.arange(vehicle.truth[0, 0] + 1.0, vehicle.truth[-1, 0] - 1.0, 0.05)
+        off = at_times(vehicle.estimate, times) - at_times(vehicle.truth, times)
+        ratios.append(ours.std(axis=0) / off.std(axis=0))
+        assert np.all(correlations(off) > 0.7)
+    assert np.all(correlations(ours) > 0.7)
+    assert len(flown) == 2
+    # Errors at least as large as recorded, and at most twice.
+    assert 1.0 <= np.min(np.mean(ratios, axis=0)) <= np.max(np.mean(ratios, axis=0)) <= 2.0
+
+
+def long_errors(profile: SensorProfile) -> npt.NDArray[np.float64]:
+    """Position and velocity errors (n, 6) of a quarter of an hour, every 0.05 s."""
+    random_errors, rows = RandomErrors(profile, np.random.default_rng(1)), []
+    for sample in range(0, 900 * SECOND, SECOND // 20):
+        random_errors.advance(sample)
+        rows.append((*random_errors.errors.position, *random_errors.errors.velocity))
+    return np.array(rows)
+
+
+def correlations(errors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Correlation of the errors (n, 6) of position and velocity on each axis."""
+    return np.array([np.corrcoef(errors[:, axis], errors[:, axis + 3])[0, 1] for axis in range(3)])
 
 
 @given(stops=st.lists(st.integers(0, 700), min_size=1, max_size=10))
