@@ -77,7 +77,7 @@ class OwnErrors(Settings):
         " its velocity",
     )
     sigma_time_us: float = Field(
-        5000.0,
+        3000.0,
         ge=0.0,
         le=500_000.0,
         description="µs, σ of the images' times that all vehicles have in common; the target's speed makes it"
