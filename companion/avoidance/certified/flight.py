@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from math import hypot, inf
+from math import hypot
 
 import numpy as np
 
 from companion.avoidance.certified.agreements import Agreements
-from companion.avoidance.certified.anticipation import NOBODY, Anticipated, Anticipation
 from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.commitment import Commitment, HoldReason
 from companion.avoidance.certified.committed import controls, rest_time
-from companion.avoidance.certified.constraint_sources import BESIDE_M, ConstraintSources
+from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
-from companion.avoidance.certified.detour import Detour
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.lane_goals import LaneGoals
-from companion.avoidance.certified.margins import beside, from_surfaces, further
+from companion.avoidance.certified.margins import beside, further
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.places import Places
+from companion.avoidance.certified.plan_goals import PlanGoals
 from companion.avoidance.certified.plan_sides import plan_sides
 from companion.avoidance.certified.qp import Objective, SeparationQp
 from companion.avoidance.certified.reservation import Reservation
@@ -29,9 +27,6 @@ from companion.avoidance.certified.vicinity import Vicinity
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
-from companion.values.vectors import limit
-from companion.ways import way_of
-from companion.ways.subgoal import Subgoal
 from companion.world import View, World
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame
@@ -44,10 +39,6 @@ from mavlink_bridge.wire.goal import PAYLOAD_TYPE as GOAL
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack
 
 _TURNING_SENSES = {"left": -1.0}
-_EFFORT = 2
-"""How much of a search is done for a plan."""
-_MOVED_M = 0.5
-"""Distance by which the end of the plan must have moved before another way counts as another one."""
 _STOOD_US = 1_000_000
 """Time (µs) within the tube of a plan at rest after which a vehicle that another controller flies stands."""
 
@@ -76,14 +67,7 @@ class CertifiedFlight:
         self._last_step = 0
         self._sources = ConstraintSources(config, steps)
         self._places = Places(config, own.system, self._sources)
-        self._detour = Detour(config.limits.within(config.field.margin(1)), certified.deadlock.detour)
-        # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
-        least = from_surfaces(certified, config.field, config.limits) + BESIDE_M
-        self._way = way_of(config, least, _EFFORT, BESIDE_M)
-        between = self._sources.between
-        fastest = min(config.limits.v_max[:2]), min(config.limits.u_max[:2])
-        self._anticipation = Anticipation(certified.anticipation, between, *fastest, sense)
-        downwash = config.field.downwash
+        downwash, between = config.field.downwash, self._sources.between
         distances = Distances(between, further(certified), steps, planar=config.planar, downwash=downwash)
         self.agreements = Agreements(
             own.system,
@@ -108,13 +92,10 @@ class CertifiedFlight:
         self.left_tube = 0
         """Number of times that the vehicle left the tube."""
         self._outside = 0.0
-        in_lanes = config.way is not None and config.way.lanes is not None
-        # In space vehicles pass over each other, in lanes they give way.
-        self._anticipates = config.planar and certified.anticipation.most > 0.0 and not in_lanes
-        self._goals = ToldGoals(own, fleet.fingerprint)
-        self._lane_goals = LaneGoals(own.system, self._goals, self._way, in_use=in_lanes)
-        self._in_lane = False
-        self._began_at: Array | None = None
+        self._told = ToldGoals(own, fleet.fingerprint)
+        self._goals = PlanGoals(
+            config, own, self.agreements, self._sources, self._told, self._deadlock_turn, sense
+        )
         self._in_control = self._announced = self._received = self._participated = False
         self._turn = 0
         self._prepared, self._begun_at = False, 0
@@ -134,7 +115,7 @@ class CertifiedFlight:
             self.agreements.receive_plan(now, system, message.payload)
         elif message.payload_type == GOAL:
             try:
-                self._goals.receive(now, system, message.payload)
+                self._told.receive(now, system, message.payload)
             except PlanWireError:
                 self.agreements.refused += 1
             return
@@ -242,8 +223,8 @@ class CertifiedFlight:
         """Work out what ways need at the height of the newest plan, while the vehicle holds its place."""
         self._prepared = True
         newest = self.commitment.announced()
-        if self._way is not None and newest is not None:
-            self._way.prepare(float(controls(newest)[-1, 2, 2]))
+        if newest is not None:
+            self._goals.prepare(float(controls(newest)[-1, 2, 2]))
 
     def _hover(self, height: float) -> None:
         """Fly the column at ``height`` (m), while all agreements that are kept have upright planes."""
@@ -352,7 +333,7 @@ class CertifiedFlight:
     @property
     def enclosed(self) -> bool:
         """Whether fixed obstacles leave no way from the end of the plan to the destination."""
-        return self._way is not None and self._way.enclosed
+        return self._goals.enclosed
 
     @property
     def lost(self) -> bool:
@@ -370,75 +351,9 @@ class CertifiedFlight:
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
         destination = self._places.destination(epoch, own[-1, 2], aim, self.agreements)
-        anticipates = self._anticipates and aim.path is None
-        self._goals.tell(destination if anticipates else None)
-        subgoal = self._subgoal(now, epoch, own[-1, 2], destination)
-        goal = subgoal.place
-        if anticipates:
-            met = self._met(now, start, destination)
-        else:
-            self._anticipation.restart()
-            met = NOBODY
-        if not self._in_lane:
-            place = own[0, 0]
-            # A sub-goal that is turned aside is not on the way any more, and may not be free.
-            met = NOBODY if subgoal.beyond > 0.0 else met
-            goal = self._deadlock_turn.turned(place, goal, met.angle)
-            if met.ahead < inf:
-                goal = place + limit(goal - place, met.ahead)
+        subgoal, goal = self._goals.chosen(now, epoch, start, own, destination, moving=aim.path is not None)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
-
-    def _subgoal(self, now: int, epoch: int, rest: Array, destination: Array) -> Subgoal:
-        """Return where the plan should end: ``destination`` (3,), m, or a place on a way round to it.
-
-        That is the way around fixed obstacles, and a detour on it around what rests.
-        """
-        way, detour = self._way, self._detour
-        begun = detour.begun, 0 if way is None else way.begun
-        if way is not None and self._deadlock_turn.stalled:
-            way.go_round(now, lambda: self._sources.at_rest(epoch, rest[2], self.agreements))
-        goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
-        in_lane = self._lane_goals.subgoal(rest, destination, self.agreements.ends)
-        if self._in_lane != (in_lane is not None):
-            self._in_lane = in_lane is not None
-            self._deadlock_turn.restart()
-        if in_lane is not None:
-            return in_lane
-        subgoal = detour.towards(
-            now,
-            rest,
-            goal.place,
-            lambda: self._sources.resting(epoch, rest, goal.place, self.agreements),
-            stalled=self._deadlock_turn.stalled,
-        )
-        if (detour.begun, 0 if way is None else way.begun) != begun:
-            self._restart(rest, goes_round=detour.begun != begun[0] or (way is not None and way.goes_round))
-        return Subgoal(subgoal.place, subgoal.beyond + goal.beyond)
-
-    def _restart(self, rest: Array, *, goes_round: bool) -> None:
-        """Measure progress anew on another way from ``rest`` (3,), m.
-
-        Where a way is lost and found again at the same place, as at a corner of an obstacle beside which
-        somebody rests, that is no progress, unless the new one ``goes_round`` what rests.
-        """
-        if goes_round or self._began_at is None or float(np.abs(rest - self._began_at).max()) > _MOVED_M:
-            self._began_at = rest.copy()
-            self._deadlock_turn.restart()
-
-    def _met(self, now: int, start: WirePlan, goal: Array) -> Anticipated:
-        """Return how to avoid encounters on the way from the ``start`` of the plan to ``goal`` (3,), m.
-
-        The others are where their newest plans are when this one begins.
-        """
-        begins, plans, told = start.epoch, self.agreements.newest(), self._goals.recent(now)
-        met = [system for system in sorted(told) if system in plans]
-        places = [plans[s].later(max(begins, plans[s].plan.epoch), 1)[0, 0] for s in met]
-        ways = [(place, told[system].position_m) for system, place in zip(met, places, strict=True)]
-        others = np.array(ways).reshape(-1, 2, 3)
-        found = self._anticipation.met(np.stack([start.position_m, goal]), others)
-        fresh = self._config.certified.anticipation.fresh
-        return found if self.agreements.age(begins, met) <= fresh else found._replace(ahead=inf)
 
     def _objective(self, begins: float, aim: Aim, goal: Array, field: Array) -> Objective:
         """Return the preferred places of a plan that begins in ``begins`` s and should end at ``goal`` (3,).
@@ -495,7 +410,7 @@ class CertifiedFlight:
         statements = self._statements(announced.epoch, every=True, farewell=farewell)
         plans = [announced, *self._repeated()]
         tunnels = [Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan)) for plan in plans]
-        return [*sync, *tunnels, *statements, *self._goals.messages()]
+        return [*sync, *tunnels, *statements, *self._told.messages()]
 
     def _away(self, now: int) -> list[Message]:
         """Return the statement that another controller flies the vehicle, if plans were announced before."""

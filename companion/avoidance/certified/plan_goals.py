@@ -1,0 +1,155 @@
+"""Where a plan should end: the destination, or a place that vehicles and obstacles leave free before it.
+
+In turn: a way around fixed obstacles (``ways``), a step in a lane (``lane_goals``), a detour around what
+rests (``detour``), the turn of a goal that is pushed back (``deadlock``), and the turn before encounters that
+are predicted (``anticipation``). All change only the cost of a plan.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.anticipation import NOBODY, Anticipated, Anticipation
+from companion.avoidance.certified.constraint_sources import BESIDE_M, ConstraintSources
+from companion.avoidance.certified.deadlock import DeadlockTurn
+from companion.avoidance.certified.detour import Detour
+from companion.avoidance.certified.lane_goals import LaneGoals
+from companion.avoidance.certified.margins import from_surfaces
+from companion.avoidance.certified.told_goals import ToldGoals
+from companion.config import CompanionConfig
+from companion.values.horizon import Array
+from companion.values.vectors import limit
+from companion.ways import way_of
+from companion.ways.subgoal import Subgoal
+from mavlink_bridge.messages import Source
+from mavlink_bridge.wire.plan import WirePlan
+
+_EFFORT = 2
+"""How much of a search is done for a plan."""
+_MOVED_M = 0.5
+"""Distance by which the end of the plan must have moved before another way counts as another one."""
+
+
+class PlanGoals:
+    """Goals of the plans of the vehicle ``own``.
+
+    ``told``: the goals that the others and the own vehicle tell. ``turn``: of the goal, to the side of
+    ``sense``.
+    """
+
+    def __init__(
+        self,
+        config: CompanionConfig,
+        own: Source,
+        agreements: Agreements,
+        sources: ConstraintSources,
+        told: ToldGoals,
+        turn: DeadlockTurn,
+        sense: float,
+    ) -> None:
+        certified, limits = config.certified, config.limits
+        self._agreements, self._sources, self._told = agreements, sources, told
+        self._deadlock_turn = turn
+        self._detour = Detour(limits.within(config.field.margin(1)), certified.deadlock.detour)
+        # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
+        least = from_surfaces(certified, config.field, limits) + BESIDE_M
+        self._way = way_of(config, least, _EFFORT, BESIDE_M)
+        fastest = min(limits.v_max[:2]), min(limits.u_max[:2])
+        self._anticipation = Anticipation(certified.anticipation, sources.between, *fastest, sense)
+        self._fresh = certified.anticipation.fresh
+        in_lanes = config.way is not None and config.way.lanes is not None
+        # In space vehicles pass over each other, in lanes they give way.
+        self._anticipates = config.planar and certified.anticipation.most > 0.0 and not in_lanes
+        self._lane_goals = LaneGoals(own.system, told, self._way, in_use=in_lanes)
+        self._in_lane = False
+        self._began_at: Array | None = None
+
+    @property
+    def enclosed(self) -> bool:
+        """Whether fixed obstacles leave no way from the end of the plan to the destination."""
+        return self._way is not None and self._way.enclosed
+
+    def prepare(self, height: float) -> None:
+        """Work out what ways need at ``height`` (m), before the vehicle goes anywhere."""
+        if self._way is not None:
+            self._way.prepare(height)
+
+    def chosen(
+        self, now: int, epoch: int, start: WirePlan, own: Array, destination: Array, *, moving: bool
+    ) -> tuple[Subgoal, Array]:
+        """Return the sub-goal on the way to ``destination`` (3,), m, and where to aim for it, (3,), m.
+
+        ``epoch``: that of ``now``, µs; ``start``: beginning of the plan; ``own`` (n, 3, 3), m: the committed
+        plan, carried on. A destination that is ``moving`` is not told to others.
+        """
+        anticipates = self._anticipates and not moving
+        self._told.tell(destination if anticipates else None)
+        subgoal = self._subgoal(now, epoch, own[-1, 2], destination)
+        goal = subgoal.place
+        if anticipates:
+            met = self._met(now, start, destination)
+        else:
+            self._anticipation.restart()
+            met = NOBODY
+        if not self._in_lane:
+            place = own[0, 0]
+            # A sub-goal that is turned aside is not on the way any more, and may not be free.
+            met = NOBODY if subgoal.beyond > 0.0 else met
+            goal = self._deadlock_turn.turned(place, goal, met.angle)
+            if met.ahead < inf:
+                goal = place + limit(goal - place, met.ahead)
+        return subgoal, goal
+
+    def _subgoal(self, now: int, epoch: int, rest: Array, destination: Array) -> Subgoal:
+        """Return where the plan should end: ``destination`` (3,), m, or a place on a way round to it.
+
+        That is the way around fixed obstacles, and a detour on it around what rests.
+        """
+        way, detour = self._way, self._detour
+        begun = detour.begun, 0 if way is None else way.begun
+        if way is not None and self._deadlock_turn.stalled:
+            way.go_round(now, lambda: self._sources.at_rest(epoch, rest[2], self._agreements))
+        goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
+        in_lane = self._lane_goals.subgoal(rest, destination, self._agreements.ends)
+        if self._in_lane != (in_lane is not None):
+            self._in_lane = in_lane is not None
+            self._deadlock_turn.restart()
+        if in_lane is not None:
+            return in_lane
+        subgoal = detour.towards(
+            now,
+            rest,
+            goal.place,
+            lambda: self._sources.resting(epoch, rest, goal.place, self._agreements),
+            stalled=self._deadlock_turn.stalled,
+        )
+        if (detour.begun, 0 if way is None else way.begun) != begun:
+            self._restart(rest, goes_round=detour.begun != begun[0] or (way is not None and way.goes_round))
+        return Subgoal(subgoal.place, subgoal.beyond + goal.beyond)
+
+    def _restart(self, rest: Array, *, goes_round: bool) -> None:
+        """Measure progress anew on another way from ``rest`` (3,), m.
+
+        Where a way is lost and found again at the same place, as at a corner of an obstacle beside which
+        somebody rests, that is no progress, unless the new one ``goes_round`` what rests.
+        """
+        if goes_round or self._began_at is None or float(np.abs(rest - self._began_at).max()) > _MOVED_M:
+            self._began_at = rest.copy()
+            self._deadlock_turn.restart()
+
+    def _met(self, now: int, start: WirePlan, goal: Array) -> Anticipated:
+        """Return how to avoid encounters on the way from the ``start`` of the plan to ``goal`` (3,), m.
+
+        The others are where their newest plans are when this one begins.
+        """
+        begins, plans, told = start.epoch, self._agreements.newest(), self._told.recent(now)
+        met = [system for system in sorted(told) if system in plans]
+        places = [plans[s].later(max(begins, plans[s].plan.epoch), 1)[0, 0] for s in met]
+        ways = [(place, told[system].position_m) for system, place in zip(met, places, strict=True)]
+        others = np.array(ways).reshape(-1, 2, 3)
+        found = self._anticipation.met(np.stack([start.position_m, goal]), others)
+        fresh = self._fresh
+        return found if self._agreements.age(begins, met) <= fresh else found._replace(ahead=inf)
