@@ -148,6 +148,16 @@ def test_on_plans_that_change_height_the_emulation_is_within_a_decimetre() -> No
         assert np.percentile(off[:, 2], 95.0) <= 0.04
 
 
+def test_on_plans_that_change_height_a_px4_is_where_the_real_one_was() -> None:
+    """With the recorded error of the estimate. What is left fits the tilt that this estimates wrongly: 1°."""
+    vehicles = read_swarm(FLIGHTS / "px4-3-certified.npz")
+    assert [vehicle.flavour for vehicle in vehicles] == ["px4"] * 3
+    for vehicle in vehicles:
+        found = follow(vehicle)
+        assert np.percentile(found.errors, 95.0) <= 0.22
+        assert found.errors.max() <= 0.27
+
+
 @pytest.mark.parametrize("name", SWARMS)
 def test_pairs_come_as_near_as_they_did(swarms: dict[str, Swarm], name: str) -> None:
     """Each flies its own recorded set-points alone, so the sum of two errors counts."""

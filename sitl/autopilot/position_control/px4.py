@@ -7,6 +7,7 @@ and tilt, and the lag of the attitude. A set-point is constant between two messa
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from mavlink_bridge.messages import Vector
 from sitl.autopilot.position_control.airframe import GRAVITY, PX4, Motion, PointMass
@@ -14,6 +15,13 @@ from sitl.autopilot.position_control.square_root import Pair, cut
 from sitl.config.autopilot import AutopilotConfig
 from sitl.config.gains import Px4Gains
 from sitl.values.setpoints import ZERO
+
+_HOVER_TIME: Final = 12.0
+"""Time constant (s) of the hover thrust's estimate, as logged flights have it (HTE_HT_NOISE)."""
+_HOVER_RANGE: Final = (0.6, 1.4)
+"""Bounds of that estimate, as shares of the true hover thrust: HTE_THR_RANGE around MPC_THR_HOVER."""
+_LEAST_WEIGHT: Final = 0.1
+"""Share of gravity below which the thrust says nothing of hovering."""
 
 
 class Px4Response:
@@ -44,6 +52,7 @@ class Px4Response:
         self._mass.restart(position)
         self._commanded: Vector = ZERO
         self._integral: Vector = ZERO
+        self._hover = 1.0
         self._previous_velocity: Vector = ZERO
         self._acceleration: Pair = (0.0, 0.0)
 
@@ -75,11 +84,11 @@ class Px4Response:
             for axis in (0, 1)
         )
         tilted = cut((north, east), GRAVITY * math.tan(gains.tilt))
-        self._commanded = (
-            *tilted,
-            acceleration[2] + gains.velocity_z * velocity_error[2] + self._integral[2],
-        )
-        self._integrate(velocity_error, (north - tilted[0], east - tilted[1]), dt)
+        down = acceleration[2] + gains.velocity_z * velocity_error[2] + self._integral[2]
+        lift = self._hover * (GRAVITY - down)
+        self._commanded = (*tilted, GRAVITY - lift)
+        self._integrate(velocity_error, _excess((north, east), tilted, down), dt)
+        self._estimate_hover(lift, down, dt)
 
     def _differentiate(self, dt: float) -> None:
         """Update the vehicle's acceleration by filtered differentiation of its velocity."""
@@ -93,7 +102,7 @@ class Px4Response:
         self._previous_velocity = self._mass.velocity
 
     def _integrate(self, velocity_error: Vector, excess: Pair, dt: float) -> None:
-        """Update the integrals; the ``excess`` over the tilt limit reduces those of north and east."""
+        """Update the integrals; the ``excess`` over what is produced reduces those of north and east."""
         gains = self._gains
         back = 2.0 / gains.velocity
         x, y, z = self._integral
@@ -101,6 +110,34 @@ class Px4Response:
         y += gains.integral * (velocity_error[1] - back * excess[1]) * dt
         z += gains.integral_z * velocity_error[2] * dt
         self._integral = (x, y, max(-GRAVITY, min(GRAVITY, z)))
+
+    def _estimate_hover(self, lift: float, down: float, dt: float) -> None:
+        """Estimate the thrust of a hover from a ``lift`` (m/s²) and the acceleration that it gives.
+
+        The integral changes with it, so that the thrust does not.
+        """
+        weight = 1.0 - self._mass.acceleration[2] / GRAVITY
+        if weight < _LEAST_WEIGHT:
+            return
+        before = self._hover
+        after = before - math.expm1(-dt / _HOVER_TIME) * (lift / (GRAVITY * weight) - before)
+        self._hover = after = max(_HOVER_RANGE[0], min(_HOVER_RANGE[1], after))
+        x, y, z = self._integral
+        z += (down - GRAVITY) * (before / after - 1.0)
+        self._integral = (x, y, max(-GRAVITY, min(GRAVITY, z)))
+
+
+def _excess(wanted: Pair, tilted: Pair, down: float) -> Pair:
+    """Return by how much the horizontal acceleration ``wanted`` exceeds that of the thrust (m/s²).
+
+    ``tilted``: ``wanted`` within the tilt limit, and what the thrust of a hover produces. With ``down`` m/s²
+    downwards the thrust is less, and so is what it produces; if it produces more, that does not count.
+    """
+    share = max(1.0 - down / GRAVITY, 0.0)
+    produced = share * tilted[0], share * tilted[1]
+    if math.hypot(*wanted) <= math.hypot(*produced):
+        return 0.0, 0.0
+    return wanted[0] - produced[0], wanted[1] - produced[1]
 
 
 def _within(first: Pair, second: Pair, limit: float) -> Pair:

@@ -25,7 +25,7 @@ from sitl.autopilot.position_control.airframe import (
     PointMass,
 )
 from sitl.autopilot.position_control.ardupilot_height import HeightControl
-from sitl.autopilot.position_control.px4 import _within
+from sitl.autopilot.position_control.px4 import _excess, _within
 from sitl.autopilot.response import Response, response_of
 from sitl.config.autopilot import AutopilotConfig
 from sitl.config.gains import ArduPilotGains, Speeds
@@ -147,9 +147,10 @@ def test_it_comes_to_rest_where_it_is_told_to(flavour: str, begin: tuple, goal: 
 
 @FIRMWARE
 def test_a_constant_velocity_is_followed_without_error_in_the_end(flavour: str) -> None:
-    """The integral learns the drag, which at first holds it back."""
+    """The integral learns the drag, which at first holds it back. A PX4 that descends has less thrust than in
+    a hover; its estimate of the hover thrust learns that within minutes."""
     velocity = np.array((3.0, -2.0, 0.5))
-    flown, _ = led(made(flavour), lambda t: motion(velocity * t, velocity), 60.0)
+    flown, _ = led(made(flavour), lambda t: motion(velocity * t, velocity), 240.0)
     times = DT * (1.0 + np.arange(len(flown)))
     errors = np.linalg.norm(flown[:, 0] - np.outer(times, velocity), axis=1)
     assert errors[100] > 0.1
@@ -498,6 +499,21 @@ def test_what_tilt_cannot_give_is_not_learnt() -> None:
     flown, _ = led(made("px4", px4={"tilt": math.radians(15.0)}), step(40.0), 40.0)
     assert flown[:, 0, 0].max() < 40.5
     assert flown[-1, 0, 0] > 39.5
+
+
+@given(
+    wanted=st.tuples(*[st.floats(-8.0, 8.0)] * 2),
+    share=st.floats(0.0, 1.0),
+    down=st.floats(-GRAVITY, 2.0 * GRAVITY),
+)
+def test_px4_does_not_learn_what_a_smaller_thrust_cannot_give(
+    wanted: tuple[float, float], share: float, down: float
+) -> None:
+    """Its thrust tilts for the wanted acceleration as in a hover, and is less while it accelerates down."""
+    tilted = share * wanted[0], share * wanted[1]
+    lift = max(GRAVITY - down, 0.0) / GRAVITY
+    missing = max(1.0 - lift * share, 0.0)
+    assert _excess(wanted, tilted, down) == pytest.approx((missing * wanted[0], missing * wanted[1]))
 
 
 NUMBERS = st.floats(-1e5, 1e5)

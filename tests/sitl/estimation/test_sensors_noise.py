@@ -122,9 +122,10 @@ def test_a_simulations_position_moves_by_its_velocity_and_the_drift():
 
 
 def test_a_simulations_errors_are_those_of_recorded_flights():
-    """Two PX4s in SIH: position and velocity are wrong together, both for seconds."""
+    """Five PX4s in SIH: position and velocity are wrong together, both for seconds."""
     ratios = []
-    flown = [v for v in read_swarm(FLIGHTS / "mixed-3-2.npz") if v.flavour == "px4"]
+    recorded = [v for name in ("mixed-3-2", "px4-3-certified") for v in read_swarm(FLIGHTS / f"{name}.npz")]
+    flown = [vehicle for vehicle in recorded if vehicle.flavour == "px4"]
     ours = long_errors(PROFILES["sih"])
     for vehicle in flown:
         times = np.arange(vehicle.truth[0, 0] + 1.0, vehicle.truth[-1, 0] - 1.0, 0.05)
@@ -132,7 +133,7 @@ def test_a_simulations_errors_are_those_of_recorded_flights():
         ratios.append(ours.std(axis=0) / off.std(axis=0))
         assert np.all(correlations(off) > 0.7)
     assert np.all(correlations(ours) > 0.7)
-    assert len(flown) == 2
+    assert len(flown) == 5
     # Errors at least as large as recorded, and at most twice.
     assert 1.0 <= np.min(np.mean(ratios, axis=0)) <= np.max(np.mean(ratios, axis=0)) <= 2.0
 
