@@ -83,7 +83,7 @@ class Perception(Settings):
         le=100.0,
         description="m along the surface that vehicles keep, where they can without loss",
     )
-    gain: Positive = Field(1.0, description="rad of turn of the destination per unit of relative descent")
+    gain: Positive = Field(2.0, description="rad of turn of the destination per unit of relative descent")
     speed: Positive = Field(1.5, description="m/s along the surface, at most, to better bearings")
     clear: float = Field(
         0.3, ge=0.0, le=10.0, description="m: an obstacle hides the target from rays that pass it so near"
