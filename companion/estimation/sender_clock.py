@@ -13,10 +13,11 @@ line is raised to this offset plus the least delay at once; as long as answers a
 raises it. A message's age is then never understated, and overstated by no more than the time that the request
 took.
 
-Answers also measure the least delay. The offset lies between that of the answers and that of the lags, so
-half of the difference between the two is the delay of each way, if both take equally long, and wrong by no
-more than this half if not (as in D. L. Mills, Network Time Protocol, RFC 5905, section 8). ``reads`` uses it
-in place of the setting: an image of a camera must be dated neither too early nor too late.
+An answer also measures the delay. The offset lies between its lower bound and the lag of the last message, so
+half of the difference is the delay of each way, if both take equally long, and wrong by no more than this
+half if not (as in D. L. Mills, Network Time Protocol, RFC 5905, section 8). ``reads`` uses the best of the
+last answers in place of the setting, because an image must be dated neither too early nor too late. As the
+rate of the clock is not used there, it is wrong by what the clock loses since that answer, too.
 
 Without answers, two explanations are accepted after long evidence. First, a lag that has changed steadily for
 half a minute is attributed to a clock of another rate, such as a simulator's (1 % and more); the rate is that
@@ -66,7 +67,11 @@ The messages of a queue that drains have a smaller one.
 _LAST_LAGS = 8
 """Number of last lags kept, for ``late``, for ``answered`` and for the line of a ``brief`` clock."""
 _ANSWER_VALID_US = 10 * _SECOND_US
-"""Time after an answer during which the lags cannot raise the line, and the answers measure the delay."""
+"""Time after an answer during which the lags cannot raise the line, and it measures the delay."""
+_ROUNDED_US = 1000
+"""Stamps may be whole milliseconds."""
+_AGEING = 0.01
+"""Error (µs per µs of age) of a measured offset: simulations' clocks are off by as much."""
 _MAX_REPEATS = 4
 """Number of repetitions of one stamp, over at least a second, after which the clock counts as stopped.
 
@@ -96,6 +101,17 @@ class _Outlier(NamedTuple):
         return self.received - self.stamp
 
 
+class _Measured(NamedTuple):
+    """Offset of the sender's clock, wrong by at most ``delay``, by an answer that came ``at`` (µs).
+
+    ``delay``: of each way if both take equally long.
+    """
+
+    offset: int
+    delay: int
+    at: int
+
+
 class SenderClock:
     """The clock of one sender; all times in µs.
 
@@ -109,7 +125,6 @@ class SenderClock:
 
     __slots__ = (
         "_answered",
-        "_asked",
         "_base",
         "_begun",
         "_delay",
@@ -118,6 +133,7 @@ class SenderClock:
         "_last_lags",
         "_least",
         "_line",
+        "_measured",
         "_newest",
         "_outliers",
         "_pieces",
@@ -143,8 +159,7 @@ class SenderClock:
         self.lost = 0
         self._lag = 0
         self._answered: int | None = None
-        # Offset by the best of the last answers, a lower bound, as of the last answer.
-        self._asked = 0.0
+        self._measured: _Measured | None = None
         # A ring; its order has no meaning.
         self._last_lags: list[int] = []
         self._delay = delay
@@ -217,19 +232,20 @@ class SenderClock:
         The message arrived at ``received`` with ``stamp`` (0: none). The estimate of the clock does not
         change.
         """
-        delay = self._delay if self._base is None else self._measured_delay(received)
         if stamp <= 0 or self._base is None:
-            return received - delay
-        return min(stamp + self._base + self.skew + self._delay - delay, received - delay)
+            return received - self._delay
+        measured = self._measured
+        if measured is None or self.brief or not self._holds(received, measured):
+            return min(stamp + self._base + self.skew, received - self._delay)
+        return min(stamp + measured.offset, received - measured.delay)
 
-    def _measured_delay(self, now: int) -> int:
-        """Return the least delay (µs) of messages at ``now``, by the answers, or as set without any."""
-        answered = self._answered
-        if answered is None or not 0 <= now - answered < _ANSWER_VALID_US or self._base is None:
-            return self._delay
-        both_ways = self._line - (self._asked - _DRIFT * (now - answered))
-        # Bounds that contradict each other are of a clock that was set in between.
-        return round(0.5 * both_ways) if both_ways >= 0.0 else self._delay
+    def _holds(self, now: int, measured: _Measured) -> bool:
+        """Return whether an offset still holds at ``now`` (µs).
+
+        A message that would be from the future shows that the clock was set forward since.
+        """
+        age = now - measured.at
+        return 0 <= age < _ANSWER_VALID_US and measured.offset <= self._lag + _AGEING * age
 
     def ahead(self, received: int, stamp: int) -> int:
         """Return by how much (µs) ``stamp`` is later than a message that arrived at ``received`` can be.
@@ -258,7 +274,8 @@ class SenderClock:
             return
         if abs(received - stamp - self._lag) > self._tolerance:
             return
-        self._hear(received, float(asked - stamp))
+        self._answered = received
+        self._measure(received, asked - stamp)
         received = max(received, self._received)
         line = self._line + self._rate * (received - self._received)
         # A message dated by this line gets the age that it would have if the request had taken no time: the
@@ -271,17 +288,18 @@ class SenderClock:
             self._forget()
             self.skew = least - self._delay - self._base
 
-    def _hear(self, received: int, offset: float) -> None:
-        """Keep the larger of ``offset``, a lower bound (µs), and of the last one, which drift has lowered.
+    def _measure(self, received: int, least: int) -> None:
+        """Measure the offset, which is at least ``least`` (µs), by an answer that came at ``received`` (µs).
 
-        The last one does not count above the line: the sender's clock was set forward since.
+        The measurement before counts on while it is better, and agrees with this one.
         """
-        before = self._answered
-        if before is not None and 0 <= received - before < _ANSWER_VALID_US:
-            last = self._asked - _DRIFT * (received - before)
-            if offset < last <= self._line:
-                offset = last
-        self._answered, self._asked = received, offset
+        most, last = self._lag, self._measured
+        if most < least - _ROUNDED_US:
+            return
+        delay = max(most - least, 0) // 2
+        agrees = last is not None and least <= last.offset <= most
+        if last is None or not agrees or last.delay + _AGEING * (received - last.at) >= delay:
+            self._measured = _Measured(least + delay, delay, received)
 
     def _forget(self) -> None:
         """Discard the lags so far: they belong to another line."""
@@ -308,7 +326,7 @@ class SenderClock:
         self._stamp = self._newest = stamp
         self._repeats, self._repeated = 0, received
         self._outliers.clear()
-        self._answered, self._lag = None, lag
+        self._answered, self._measured, self._lag = None, None, lag
         self._last_lags = [lag] * _LAST_LAGS
         self._received, self._line, self._rate = received, float(lag), 0.0
         self._pieces.clear()

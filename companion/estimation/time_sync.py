@@ -42,7 +42,7 @@ class RoundTrips:
     """TIMESYNC exchange between the companion ``own`` and the autopilot of its system.
 
     ``regular``: requests are sent although messages arrive as expected, because images are dated by the
-    answers. ``always``: the same, and may change.
+    answers. ``always``: the same, set while it is not known whether the clock is a simulation's.
     """
 
     def __init__(self, own: Source, *, regular: bool = False) -> None:

@@ -192,7 +192,8 @@ class Commitment:
         state = State(own[0, 0], start.velocity_m_s, self._last_acceleration(), flown)
         box = None
         if self._sides is not None:
-            # A goal that is turned back would be out of a box that lies towards the goal.
+            # A goal that is turned back would be out of a box that lies towards the goal. A moving
+            # destination may be behind the vehicle, too. Either box is one in which the plan may be.
             aim = objective.places[-1]
             turned_back = float((aim - own[0, 0]) @ (goal.place - own[0, 0])) < 0.0
             box = region(own, aim if turned_back else goal.place, self._sides - 2.0 * self._rounding.max())

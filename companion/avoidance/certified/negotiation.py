@@ -2,9 +2,10 @@
 
 Both vehicles of a pair propose the same agreement, on their plans of one epoch, each as soon as it holds both
 plans. So the proposal of the peer is the answer to the own one, and an agreement is known to be taken after
-two delays of a message: one of the plan, and one of the proposal. If each proposed another one, it would bar
-the other's. Where messages are late, the newest own plan is later than that of the agreement, and must keep
-it.
+two delays of a message: one of the plan, and one of the proposal. Where messages are late, the newest own
+plan is later than that of the agreement, and must keep it. Where messages are lost they may propose different
+ones: the newer one counts, or both are refused. If they have no epoch in common for some time, as where both
+miss epochs on busy machines, the vehicle with the lower id proposes the newest plans.
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ class Negotiation:
                 peer.agree(one, made(*plans, self._geometry.agreed))
                 break
             refused = refused or one
-        other, common = peer.plans.before(epoch), self._common(peer, newest, since)
+        other, common = peer.plans.before(epoch), self._proposable(peer, newest, since)
         if common is not None and self._worthwhile(now, peer, newest, common):
             planes = made(*common, self._geometry.agreed)
             peer.propose(now, Agreement(common.own.plan.epoch, common.other.plan.epoch), planes)
@@ -103,18 +104,27 @@ class Negotiation:
             left = inf if waiting is None or waiting > patience else patience - waiting
             peer.settled, peer.settled_until = newest, now + left
 
-    def _common(self, peer: Peer, newest: StoredPlan, since: int) -> AgreedPlans | None:
-        """Return the plans of both of the last epoch from ``since`` (µs) to the ``newest`` plan's.
+    def _proposable(self, peer: Peer, newest: StoredPlan, since: int) -> AgreedPlans | None:
+        """Return the plans on which an agreement may be proposed; None without any.
 
-        It is the last one of which both are filed; None without one.
+        They are those of the last epoch of which both are filed, not before ``since`` (µs). If newer plans of
+        the peer have come for ``_LATE_US`` without one, they are the ``newest`` of both, for the lower id.
         """
         epoch = newest.plan.epoch
-        while (other := peer.plans.before(epoch)) is not None and other.plan.epoch >= since:
+        last = other = peer.plans.before(epoch)
+        while other is not None and other.plan.epoch >= since:
             own = self._plans.get(other.plan.epoch)
             if own is not None:
-                return AgreedPlans(own, other)
-            epoch = other.plan.epoch - 1
-        return None
+                break
+            other = peer.plans.before(other.plan.epoch - 1)
+        else:
+            own = other = None
+        if last is None:
+            return None
+        known = since if other is None else other.plan.epoch
+        if peer.pair.leads and last.plan.epoch - known > _LATE_US:
+            return AgreedPlans(newest, last)
+        return None if own is None or other is None else AgreedPlans(own, other)
 
     def plans_of(self, peer: Peer, one: Agreement) -> AgreedPlans | None:
         """Return the two plans of an agreement; None if one is not filed."""
@@ -131,7 +141,7 @@ class Negotiation:
         return agreed is not None and newest is not None and self._same(agreed, newest)
 
     def _worthwhile(self, now: int, peer: Peer, newest: StoredPlan, plans: AgreedPlans) -> bool:
-        """Return whether an agreement on these ``plans`` of one epoch is to be proposed.
+        """Return whether an agreement on these ``plans`` is to be proposed.
 
         The ``newest`` own plan must keep it, as where it is taken.
         """
@@ -190,7 +200,7 @@ class Negotiation:
         return flown is None or begins >= epoch or self._kept(flown, plans, begins)
 
     def _apart(self, peer: Peer, plans: AgreedPlans) -> bool:
-        """Return whether plans of one epoch are as far apart as the confirmed agreement demands.
+        """Return whether two plans are as far apart as the confirmed agreement demands.
 
         A plan that either made before it took that agreement may not keep it, and planes between two near
         plans would keep only their distance.

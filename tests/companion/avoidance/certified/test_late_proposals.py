@@ -113,6 +113,18 @@ def test_nothing_is_proposed_on_plans_of_before_the_own_return() -> None:
     assert two.first.kept() == {OTHER: (Agreement(epoch(2), epoch(2)),)}
 
 
+def test_two_that_never_make_plans_of_one_epoch_agree_on_their_newest() -> None:
+    """Each misses every second epoch, as on a machine that is busy."""
+    two = agreed()
+    for number in range(1, 40):
+        system = OWN if number % 2 else OTHER
+        two.make(system, plan(number, x=0.01 * number + (0.0 if system == OWN else 4.0)))
+        two.tell(system, NOW + number * LENGTH)
+    for one, other in ((two.first, OTHER), (two.second, OWN)):
+        (oldest, *_) = one.kept()[other]
+        assert min(oldest) > epoch(20)
+
+
 class Late(Swarm):
     """Each message arrives exactly ``late`` µs after it was sent."""
 
