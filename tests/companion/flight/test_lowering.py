@@ -93,6 +93,14 @@ def test_plans_stay_within_configuration_and_autopilot(vehicle, asked):
     assert lowered(kept, profile, parameters).changes == ()
 
 
+def test_a_least_velocity_stays_valid_however_low_the_speed_is():
+    """Found by the law above: −0.25 m/s is lowered in proportion to v_max of 7 m/s."""
+    asked = LimitsConfig(v_max=(1.0, 7.0, 1.0), v_min=(-1.0, -0.25, -1.0))
+    kept = lowered(asked, ARDUPILOT, {"WPNAV_SPEED": 250.0}).limits
+    assert kept.v_min[1] == -0.1
+    LimitsConfig.model_validate(kept.model_dump())
+
+
 @pytest.mark.parametrize(
     ("profile", "parameters", "changes"),
     [
