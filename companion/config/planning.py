@@ -41,7 +41,11 @@ Bounds = Annotated[
 """Bounds of the three axes, east, north and up; one number is that of each."""
 
 
-Floor = Annotated[float, Field(ge=-100.0, le=-0.1)]
+NEAREST_FLOOR = -0.1
+"""No least value of an axis is nearer to 0."""
+
+
+Floor = Annotated[float, Field(ge=-100.0, le=NEAREST_FLOOR)]
 
 
 Floors = Annotated[

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from math import degrees, hypot, inf
 from typing import NamedTuple
 
-from companion.config.planning import LimitsConfig
+from companion.config.planning import NEAREST_FLOOR, LimitsConfig
 from companion.flight.autopilots import Loop, Profile, Shaping
 from companion.flight.autopilots.limits import STOCK, Limits, deciding, limits_of
 
@@ -20,8 +20,6 @@ _AXIS_SHARE = 0.7
 """Share of the bound on a horizontal norm that each of the two axes may use, about 1/√2."""
 _TILT_SHARE = 0.9
 """Share of the acceleration at the largest tilt that plan and compensation may use; the rest is for gusts."""
-_NEAREST_V_MIN = -0.1
-"""m/s: no least velocity on an axis may be nearer to 0 (``LimitsConfig.v_min``)."""
 _TOLERANCE = 1e-3
 """Relative difference up to which a lower limit counts as equal: parameters are float32."""
 
@@ -82,7 +80,7 @@ def lowered(limits: LimitsConfig, profile: Profile, parameters: Mapping[str, flo
         found = found.model_copy(update={"u_min": (max(x, -u), max(y, -u), max(z, -a_total))})
     if limits.v_min is not None:
         x, y, z = limits.v_min
-        lower = [min(speed * one, _NEAREST_V_MIN) for one in (x, y)]
+        lower = [min(speed * one, NEAREST_FLOOR) for one in (x, y)]
         found = found.model_copy(update={"v_min": (*lower, max(z, -able.sink))})
     reported = tuple(
         f"{what} ({' '.join((name, f'{value:g}'))})"

@@ -66,11 +66,12 @@ def cells_of(
         )
         place = f"{where}: {row.label}"
         if needed is None or row.label in needed:
-            for seed in range(1, 1 + (seeds if given or boxes else 1)):
-                named = f", seed {seed}" if given or boxes else ""
-                named += f", {[*boxes][(seed - 1) % len(boxes)]}" if boxes else ""
+            from_files, names = bool(given or boxes), list(boxes)
+            for seed in range(1, 1 + (seeds if from_files else 1)):
+                found_at = f"{place}, seed {seed}" if from_files else place
+                if names:
+                    found_at += f", {names[(seed - 1) % len(names)]}"
                 # Read like a file, for the same messages.
-                found_at = f"{place}{named}"
                 prepared(read(json.dumps(document_of(scene, seed)).encode(), found_at, Scenario), found_at)
         document = scene.model_dump_json()
         vehicle = load(find("vehicles", str(changed["vehicle"])), VehicleConfig).model_dump_json()
