@@ -36,8 +36,9 @@ class Detour:
         self._low, self._high = np.array(limits.box_min[:2]), np.array(limits.box_max[:2])
         self._ahead = ahead
         self._way: Array | None = None
+        self._choice = 0
         self._next_search = 0
-        self._looking: Generator[None, None, Array | None] | None = None
+        self._looking: Generator[None, None, tuple[int, Array] | None] | None = None
         self.begun = 0
         """Number of ways that were begun."""
 
@@ -57,7 +58,9 @@ class Detour:
         if free(here, there[None], without(here, without(there, choices[0])))[0]:
             self._way = self._looking = None
             return Subgoal(goal, 0.0)
-        if self._still_free(here, there, choices[0]):
+        kept = self._still_free(here, there, choices[min(self._choice, len(choices) - 1)])
+        # One that leads through what rests is searched anew where there is no progress along it.
+        if kept and not (self._choice and (stalled or self._looking is not None)):
             self._looking = None
         else:
             # Until the search ends the old way is followed: straight on leads back into the pocket.
@@ -73,21 +76,27 @@ class Detour:
             try:
                 next(self._looking)
             except StopIteration as end:
-                self._looking, self._way = None, end.value
+                self._looking = self._way = None
+                if end.value is not None:
+                    self._choice, self._way = end.value
                 self._next_search = now + (_AGAIN_US if self._way is None else _EVERY_US)
                 self.begun += self._way is not None
                 return
 
     def _first(
         self, here: Array, there: Array, choices: Sequence[Discs]
-    ) -> Generator[None, None, Array | None]:
-        """Return the way among the first of ``choices`` that leave one; it yields after each part."""
-        # What stays for ever alone is another choice only where something else rests.
-        different = [discs for discs in choices[1:] if len(discs.radii) < len(choices[0].radii)]
-        for discs in (choices[0], *different):
+    ) -> Generator[None, None, tuple[int, Array] | None]:
+        """Return the number of the first of ``choices`` that leave a way, and the way.
+
+        It yields after each part.
+        """
+        for number, discs in enumerate(choices):
+            # What stays for ever alone is another choice only where something else rests.
+            if number and len(discs.radii) == len(choices[0].radii):
+                continue
             found = yield from finding(here, there, discs, self._low, self._high)
             if found is not None:
-                return found
+                return number, found
         return None
 
     def _still_free(self, here: Array, there: Array, discs: Discs) -> bool:

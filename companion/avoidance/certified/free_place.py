@@ -22,9 +22,16 @@ def covered(goal: Array, centres: Array, radii: Array) -> bool:
 
 
 def free_place(goal: Array, discs: Discs, low: Array, high: Array) -> Array | None:
-    """Return the place (2,), m, nearest to ``goal`` (2,) that is in none of the ``discs``.
+    """Return the place (2,), m, nearest to ``goal`` (2,) of ``free_places``; None if there is none."""
+    places = free_places(goal, discs, low, high)
+    return places[0] if len(places) else None
 
-    It is within ``low`` and ``high`` (2,). None: there is none, or only beyond the sides of rectangles.
+
+def free_places(goal: Array, discs: Discs, low: Array, high: Array) -> Array:
+    """Return places (k, 2), m, near ``goal`` (2,) that are in none of the ``discs``, the nearest first.
+
+    These are ``goal``, those on the edge of one disc and those where two edges cross, within ``low`` and
+    ``high`` (2,). None are on the edges of rectangles.
     """
     places = np.concatenate([goal[None], _outward(goal, discs), _crossings(discs)])
     inside = ((places >= low) & (places <= high)).all(axis=1)
@@ -32,10 +39,8 @@ def free_place(goal: Array, discs: Discs, low: Array, high: Array) -> Array | No
     free = (np.vecdot(off, off) >= (discs.radii - _ROUNDING_M) ** 2).all(axis=1)
     beside = (discs.rectangles.distance(places) >= discs.rectangles.radii).all(axis=1)
     places = places[inside & free & beside]
-    if not len(places):
-        return None
     off = places - goal
-    result: Array = places[int(np.vecdot(off, off).argmin())]
+    result: Array = places[np.argsort(np.vecdot(off, off), kind="stable")]
     return result
 
 

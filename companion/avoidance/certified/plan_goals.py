@@ -18,6 +18,7 @@ from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.detour import Detour
 from companion.avoidance.certified.lane_goals import LaneGoals
 from companion.avoidance.certified.margins import from_surfaces
+from companion.avoidance.certified.room import Room
 from companion.avoidance.certified.told_goals import ToldGoals
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
@@ -64,6 +65,8 @@ class PlanGoals:
         # In space vehicles pass over each other, in lanes they give way.
         self._anticipates = config.planar and certified.anticipation.most > 0.0 and not in_lanes
         self._lane_goals = LaneGoals(own.system, told, self._way, in_use=in_lanes)
+        # In lanes vehicles make room by steps.
+        self._room = None if in_lanes else Room(config, own.system, told, sources)
         self._in_lane = False
         self._began_at: Array | None = None
 
@@ -86,9 +89,18 @@ class PlanGoals:
         plan, carried on. A destination that is ``moving`` is not told to others.
         """
         anticipates = self._anticipates and not moving
-        self._told.tell(destination if anticipates else None)
-        subgoal = self._subgoal(now, epoch, own[-1, 2], destination)
+        rest, room, stalled = own[-1, 2], self._room, self._deadlock_turn.stalled
+        aim = destination
+        if room is not None and not moving:
+            aim = room.destination(now, epoch, rest, destination, self._agreements)
+            if room.moved:
+                self._deadlock_turn.restart()
+        subgoal = self._subgoal(now, epoch, rest, aim)
         goal = subgoal.place
+        if room is not None:
+            asked = None if moving else room.asked(rest, goal, stalled=stalled)
+            tells = anticipates or asked is not None
+            self._told.tell(destination if tells else None, room=asked)
         if anticipates:
             met = self._met(now, start, destination)
         else:

@@ -1,14 +1,14 @@
 """Goals that vehicles tell each other, so that each knows where the others fly to.
 
-A vehicle tells its goal, and whether it has been there, in a TUNNEL of its own with each transmission of its
-plan. Nothing that certifies separation depends on it.
+A vehicle tells its goal, whether it has been there, and the room that it asks for, in a TUNNEL of its own
+with each transmission of its plan. Nothing that certifies separation depends on it.
 """
 
 from __future__ import annotations
 
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Message, Source, Tunnel
-from mavlink_bridge.wire.goal import PAYLOAD_TYPE, WireGoal, goal_at, pack, unpack
+from mavlink_bridge.wire.goal import PAYLOAD_TYPE, WireGoal, WireRoom, goal_at, pack, unpack
 
 _VALID_US = 2_000_000
 """Time (µs) for which a goal is that of its vehicle; one that has none tells none."""
@@ -21,6 +21,7 @@ class ToldGoals:
         self._own, self._origin = own, origin
         self._received: dict[int, tuple[int, WireGoal]] = {}
         self._goal: tuple[Array, bool] | None = None
+        self._room: WireRoom | None = None
 
     def receive(self, now: int, system: int, payload: bytes) -> None:
         """Keep the goal that ``system`` tells at ``now`` (µs), unless it is in another frame.
@@ -40,14 +41,17 @@ class ToldGoals:
         """Return the goals that are valid at ``now`` (µs), by system id."""
         return {s: goal for s, (time, goal) in self._received.items() if now - time <= _VALID_US}
 
-    def tell(self, goal: Array | None, *, reached: bool = False) -> None:
-        """Tell the ``goal`` (3,), m, from now on, and whether it was ``reached``; None: tell none."""
-        self._goal = None if goal is None else (goal, reached)
+    def tell(self, goal: Array | None, *, reached: bool = False, room: WireRoom | None = None) -> None:
+        """Tell the ``goal`` (3,), m, whether it was ``reached``, and the ``room`` that is asked for.
+
+        None: tell none.
+        """
+        self._goal, self._room = None if goal is None else (goal, reached), room
 
     def messages(self) -> list[Message]:
         """Return the message of the own goal, if it is told."""
         if self._goal is None:
             return []
         goal, reached = self._goal
-        told = goal_at(goal, self._origin, reached=reached)
+        told = goal_at(goal, self._origin, reached=reached, room=self._room)
         return [Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(told))]

@@ -12,6 +12,7 @@ import pytest
 from companion.avoidance.certified import detour as module
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.detour import Detour, Subgoal
+from companion.avoidance.certified.room import Room
 from companion.avoidance.certified.visibility_graph import Discs, Rectangles, finding, free
 from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig
@@ -270,6 +271,36 @@ def test_a_blocked_way_is_searched_anew_without_a_stall() -> None:
     assert np.abs(found - aside).max() > 0.1
 
 
+def test_a_way_through_what_rests_is_kept_and_searched_anew_where_there_is_no_progress() -> None:
+    """Those that rest close all ways; the way among what stays for ever leads through them."""
+    here, there, ring = boxes(1)
+    fixed = ring._replace(centres=NOTHING.centres, radii=NOTHING.radii)
+    shortest = way(here, there, fixed, LOW, HIGH)
+    assert shortest is not None
+    limits = LimitsConfig(box_min=(-30.0, -30.0, 3.0), box_max=(30.0, 30.0, 10.0))
+    detour, now = Detour(limits, 3.0), 0
+    rest, goal = np.array([*here, 5.0]), np.array([*there, 5.0])
+
+    def subgoal(resting: Discs, *, stalled: bool) -> Subgoal:
+        nonlocal now
+        now += 200_000
+        return detour.towards(now, rest, goal, lambda: [resting, fixed], stalled=stalled)
+
+    while not detour.begun and now < 20_000_000:
+        subgoal(ring, stalled=True)
+    for _ in range(30):
+        found = subgoal(ring, stalled=False)
+        assert detour.begun == 1
+        assert float(np.linalg.norm(found.place - rest)) + found.beyond == pytest.approx(
+            length(here, shortest)
+        )
+    opened = ring._replace(centres=np.delete(ring.centres, [5, 6, 7], axis=0), radii=ring.radii[3:])
+    until = now + 6_000_000
+    while detour.begun == 1 and now < until:
+        subgoal(opened, stalled=True)
+    assert detour.begun == 2
+
+
 POCKET = np.array(
     [[-3.0, 2.0], [-3.0, 0.0], [-2.6, -2.0], [-1.0, -3.2], [1.0, -3.2], [2.6, -2.0], [3.0, 0.0], [3.0, 2.0]]
 )
@@ -299,10 +330,11 @@ def test_a_vehicle_leaves_a_pocket_of_vehicles_that_rest() -> None:
     assert off < 0.3
 
 
-def test_without_a_detour_it_stays_in_the_pocket(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_detour_and_without_room_it_stays_in_the_pocket(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         Detour, "towards", lambda _self, _now, _rest, goal, _discs, *, stalled: Subgoal(goal, 0.0)
     )
+    monkeypatch.setattr(Room, "asked", lambda _self, _rest, _subgoal, *, stalled: None)
     assert flown()[1] > 3.0
 
 

@@ -1,0 +1,158 @@
+"""Room that vehicles at their goals make for one that cannot get on.
+
+Vehicles at their goals close gaps for others. One that made no progress for a while asks for room: it tells
+its goal and the next place on its way (``told_goals.py``). A vehicle that has been at its goal stands aside
+while its goal is in the corridor from the end of the other's plan to that place, and returns afterwards.
+Where those that rest leave it no place beside the corridor, it asks for room, too, with a rank one higher. A
+vehicle stands aside for lower ranks than its own, and for a lower id of the same rank; so no two wait for
+each other. Only destinations change; planes keep all distances.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.constraint_sources import ConstraintSources
+from companion.avoidance.certified.free_place import covered, free_places
+from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.visibility_graph import Discs, free, without
+from companion.config import CompanionConfig
+from companion.values.horizon import Array
+from companion.values.vectors import limit
+from mavlink_bridge.wire.goal import WireGoal, WireRoom, room_to
+
+_REACHED_M = 0.2
+"""Distance of the end of the plan from a goal that counts as reached, and by which a goal may move."""
+_WIDE, _KEPT = 1.1, 1.03
+"""Half width of a corridor in least distances of plans: for a new place beside it, and for the one that it
+has."""
+_LONG = 2.0
+"""Longest corridor in least distances of plans."""
+_PART = 0.3
+"""Distance of the discs that make a corridor, in least distances of plans."""
+_MOST_RANK = 7
+
+
+class Room:
+    """Room that the vehicle ``own`` (system id) asks for and makes, beside what its ``sources`` say."""
+
+    def __init__(
+        self, config: CompanionConfig, own: int, told: ToldGoals, sources: ConstraintSources
+    ) -> None:
+        self._own, self._told, self._sources = own, told, sources
+        limits = config.limits.within(config.field.margin(1))
+        self._low, self._high = np.array(limits.box_min[:2]), np.array(limits.box_max[:2])
+        self._planar, self._downwash = config.planar, config.field.downwash
+        self._goal: Array | None = None
+        self._reached = self._asks = False
+        self._aside: Array | None = None
+        self._rank = 0
+        self.moved = False
+        """Whether ``destination`` is another place than when it was called before, for the same goal."""
+
+    def destination(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
+        """Return where to go at ``now`` (µs): the ``goal`` (3,), m, or a place beside corridors.
+
+        These are the corridors of those that ask. The plan of ``epoch`` (µs) ends at ``rest`` (3,), m.
+        """
+        if self._goal is None or float(np.abs(self._goal - goal).max()) > _REACHED_M:
+            self._reached = self._asks = False
+        self._goal = goal
+        there = float(np.abs(rest - goal).max()) < _REACHED_M
+        self._reached |= there
+        self._asks &= not there
+        before = self._aside
+        self._aside = self._place(now, epoch, rest, goal, agreements) if self._reached else None
+        self.moved = before is not self._aside
+        return goal if self._aside is None else self._aside
+
+    def asked(self, rest: Array, subgoal: Array, *, stalled: bool) -> WireRoom | None:
+        """Return the room that the vehicle asks for from ``rest`` to its ``subgoal`` (3,), m; None for none.
+
+        ``stalled``: it makes no progress. It asks until it is at its goal.
+        """
+        self._asks |= stalled
+        if self._aside is not None and self._rank == 0:
+            return None
+        if not self._asks and self._aside is None:
+            return None
+        longest = _LONG * self._sources.between
+        return room_to(rest + limit(subgoal - rest, longest), self._rank)
+
+    def _place(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array | None:
+        """Return the place to stand at while ``goal`` (3,), m, is in a corridor; None if it is in none."""
+        asking = self._asking(now, goal)
+        ends = agreements.ends()
+        wide = [self._corridor(one, ends.get(system), goal, _WIDE) for system, one in asking]
+        counted = [index for index, discs in enumerate(wide) if covered(goal[:2], discs.centres, discs.radii)]
+        if not counted:
+            self._rank = 0
+            return None
+        resting, fixed = self._sources.resting(epoch, rest, goal, agreements)
+        if self._aside is not None:
+            kept = [self._corridor(one, ends.get(system), goal, _KEPT) for system, one in asking]
+            if not any(covered(self._aside[:2], discs.centres, discs.radii) for discs in kept):
+                return self._aside
+        # The first have the lowest ranks: if there is no place for all, there is one for these.
+        for discs, rank in ((resting, 0), (fixed, 1)):
+            for among in (wide, wide[counted[0] : counted[0] + 1]):
+                places = free_places(goal[:2], _together(discs, among), self._low, self._high)
+                seen = np.flatnonzero(free(rest[:2], places, without(rest[:2], discs)))
+                if len(seen):
+                    found, first = places[seen[0]], asking[counted[0]][1].room
+                    self._rank = min(first.rank + 1, _MOST_RANK) if rank and first is not None else 0
+                    return np.array([found[0], found[1], goal[2]])
+        return self._aside
+
+    def _asking(self, now: int, goal: Array) -> list[tuple[int, WireGoal]]:
+        """Return those that ask for room before this vehicle, by system id, lower ranks first.
+
+        Not those whose goal is so near to the own ``goal`` (3,), m, that both cannot be reached.
+        """
+        mine = (self._rank, self._own) if self._aside is not None and self._rank else (inf, self._own)
+        found = []
+        for system, one in self._told.recent(now).items():
+            if one.room is None or (one.room.rank, system) >= mine:
+                continue
+            off = self._off(one.position_m - goal)
+            if one.room.rank or float(off @ off) >= self._sources.between**2:
+                found.append(((one.room.rank, system), one))
+        return [(key[1], one) for key, one in sorted(found, key=lambda item: item[0])]
+
+    def _corridor(self, asking: WireGoal, end: Array | None, goal: Array, wide: float) -> Discs:
+        """Return the discs at the height of ``goal`` (3,), m, of the corridor from ``end`` (3,) on.
+
+        That of a vehicle on the way to its goal includes the place around it.
+        """
+        between = self._sources.between
+        room = asking.room
+        places = []
+        if room is not None:
+            last = room.next_place_m
+            first = last if end is None else end
+            length = float(np.linalg.norm(last - first))
+            parts = max(1, int(length / (_PART * between)))
+            places = [first + share * (last - first) for share in np.linspace(0.0, 1.0, parts + 1)]
+            if room.rank == 0:
+                places.append(asking.position_m)
+        centres = np.array(places).reshape(-1, 3)
+        above = np.zeros(len(centres)) if self._planar else (centres[:, 2] - goal[2]) / self._downwash
+        square = (wide * between) ** 2 - above**2
+        near = square > 0.0
+        return Discs(centres[near, :2], np.sqrt(square[near]))
+
+    def _off(self, difference: Array) -> Array:
+        """Return ``difference`` (3,), m, as distances of vehicles are measured."""
+        result: Array = difference * np.array([1.0, 1.0, 0.0 if self._planar else 1.0 / self._downwash])
+        return result
+
+
+def _together(discs: Discs, corridors: list[Discs]) -> Discs:
+    """Return ``discs`` and those of all ``corridors``."""
+    return discs._replace(
+        centres=np.vstack([discs.centres, *(one.centres for one in corridors)]),
+        radii=np.concatenate([discs.radii, *(one.radii for one in corridors)]),
+    )
