@@ -351,7 +351,9 @@ class CertifiedFlight:
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
         destination = self._places.destination(epoch, own[-1, 2], aim, self.agreements)
-        subgoal, goal = self._goals.chosen(now, epoch, start, own, destination, moving=aim.path is not None)
+        given = destination is aim.destination
+        moving = aim.path is not None
+        subgoal, goal = self._goals.chosen(now, epoch, start, own, destination, given=given, moving=moving)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 

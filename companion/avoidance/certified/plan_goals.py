@@ -65,7 +65,8 @@ class PlanGoals:
         # In space vehicles pass over each other, in lanes they give way.
         self._anticipates = config.planar and certified.anticipation.most > 0.0 and not in_lanes
         self._lane_goals = LaneGoals(own.system, told, self._way, in_use=in_lanes)
-        # In lanes vehicles make room by steps.
+        # In lanes vehicles make room by steps, and tell their goals for that.
+        self._gives_way = in_lanes
         self._room = None if in_lanes else Room(config, own.system, told, sources)
         self._in_lane = False
         self._began_at: Array | None = None
@@ -81,24 +82,35 @@ class PlanGoals:
             self._way.prepare(height)
 
     def chosen(
-        self, now: int, epoch: int, start: WirePlan, own: Array, destination: Array, *, moving: bool
+        self,
+        now: int,
+        epoch: int,
+        start: WirePlan,
+        own: Array,
+        destination: Array,
+        *,
+        given: bool,
+        moving: bool,
     ) -> tuple[Subgoal, Array]:
         """Return the sub-goal on the way to ``destination`` (3,), m, and where to aim for it, (3,), m.
 
         ``epoch``: that of ``now``, µs; ``start``: beginning of the plan; ``own`` (n, 3, 3), m: the committed
-        plan, carried on. A destination that is ``moving`` is not told to others.
+        plan, carried on. A destination that is ``moving`` is not told to others. One that is not ``given``
+        but another place in its stead depends on where others rest: no room is asked for and made there.
         """
         anticipates = self._anticipates and not moving
-        rest, room, stalled = own[-1, 2], self._room, self._deadlock_turn.stalled
-        aim = destination
-        if room is not None and not moving:
+        rest, stalled = own[-1, 2], self._deadlock_turn.stalled
+        room = self._room if given and not moving else None
+        aim, asked = destination, None
+        if room is not None:
             aim = room.destination(now, epoch, rest, destination, self._agreements)
             if room.moved:
                 self._deadlock_turn.restart()
         subgoal = self._subgoal(now, epoch, rest, aim)
         goal = subgoal.place
         if room is not None:
-            asked = None if moving else room.asked(rest, goal, stalled=stalled)
+            asked = room.asked(rest, goal, stalled=stalled)
+        if not self._gives_way:
             tells = anticipates or asked is not None
             self._told.tell(destination if tells else None, room=asked)
         if anticipates:
