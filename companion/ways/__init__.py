@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from companion.config import CompanionConfig
-from companion.config.obstacles import Post
+from companion.config.obstacles import Obstacle, Post
 
 if TYPE_CHECKING:
+    from companion.ways.space_detour import SpaceDetour
     from companion.ways.way import Way
 
 
@@ -22,9 +23,23 @@ def way_of(config: CompanionConfig, least: float, effort: int = 1, spare: float 
         return None
     from companion.ways.way import Way
 
-    # Plans with planes keep away from posts as if these had no top.
-    endless = config.avoidance == "certified"
-    obstacles = [one.endless if endless and isinstance(one, Post) else one for one in config.obstacles]
     limits = config.limits.within(config.field.margin(1))
     parts = effort * config.way.parts
-    return Way(config.way, obstacles, limits, least, parts, planar=config.planar, spare=spare)
+    return Way(config.way, _obstacles(config), limits, least, parts, planar=config.planar, spare=spare)
+
+
+def space_detour_of(config: CompanionConfig, kept: float, between: float, room: float) -> SpaceDetour:
+    """Return the detours in space of a vehicle with ``config``.
+
+    ``kept`` (m): what plans keep from fixed obstacles; ``between`` (m): from others. ``room`` (m): wanted
+    beyond these distances. The search is loaded only here.
+    """
+    from companion.ways.space_detour import SpaceDetour
+
+    return SpaceDetour(_obstacles(config), config.limits.within(config.field.margin(1)), kept, between, room)
+
+
+def _obstacles(config: CompanionConfig) -> list[Obstacle]:
+    """Return the fixed obstacles; plans with planes keep away from posts as if these had no top."""
+    endless = config.avoidance == "certified"
+    return [one.endless if endless and isinstance(one, Post) else one for one in config.obstacles]

@@ -28,6 +28,7 @@ from companion.values.horizon import Array
 from companion.ways.balls import Balls
 from companion.ways.grid import Grid, Indices, grid
 from companion.ways.lines import compare
+from companion.ways.lowered import lowered
 
 _BLOCK = 8
 """Edge of a block in cells."""
@@ -62,7 +63,7 @@ class Clearance:
         """Return these clearances with ``balls`` as obstacles, too."""
         found = copy(self)
         found._balls = balls
-        found.cells = np.minimum(self.cells, balls.distance(self.grid.places(np.arange(len(self.grid)))))
+        found.cells = lowered(self.cells, self.grid, balls)
         found.cells.flags.writeable = False
         return found
 

@@ -32,12 +32,15 @@ def shortened(clear: Clearance, chain: Array, clearance: float) -> Checks:
     return way
 
 
-def along(corners: Array) -> Array:
-    """Return places (n, 3), m, on the way over ``corners`` (k, 3), m, among them each corner."""
+def along(corners: Array, spacing: float = _SPACING_M) -> Array:
+    """Return places (n, 3), m, on the way over ``corners`` (k, 3), m, among them each corner.
+
+    They are ``spacing`` (m) from each other at most.
+    """
     parts = [corners[:1]]
     for one, two in pairwise(corners):
         line = two - one
-        count = int(np.sqrt(line @ line) / _SPACING_M) + 1
+        count = int(np.sqrt(line @ line) / spacing) + 1
         places = one + np.arange(1.0, count + 1.0)[:, None] / count * line
         places[-1] = two
         parts.append(places)

@@ -264,23 +264,25 @@ class ConstraintSources:
             for found in (fixed + landed + vehicles, fixed + landed)
         ]
 
-    def at_rest(self, epoch: int, height: float, agreements: Agreements) -> Balls:
+    def at_rest(self, epoch: int, agreements: Agreements) -> Balls:
         """Return where others rest that a way must pass from ``epoch`` (µs) on, beside fixed obstacles.
 
-        These are landed vehicles, and those whose newest plan rests. In a plane, and in columns, they are at
-        the ``height`` (m) of the way. Plans keep as much from these as from fixed obstacles.
+        These are landed vehicles, and those whose newest plan rests. Of landed vehicles, of columns and in a
+        plane heights do not count. Plans keep as much from these as from fixed obstacles.
         """
-        places, kept = [], []
+        places, kept, flat = [], [], []
         for last in agreements.left.values():
-            places.append([*last.controls[-1, 2, :2], height])
+            places.append(last.controls[-1, 2])
             kept.append(self.from_last(last))
+            flat.append(0.0)
         for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():
             if system not in agreements.left:
                 level = self._config.planar or system in agreements.columns
-                places.append([*end[:2], height if level else end[2]])
+                places.append(end)
                 kept.append(self.between)
+                flat.append(0.0 if level else 1.0 / self._config.field.downwash)
         radii = np.array(kept) - self._from_surfaces
-        return Balls(np.array(places).reshape(-1, 3), radii, self._config.field.downwash)
+        return Balls(np.array(places).reshape(-1, 3), radii, np.array(flat))
 
     def _rectangles(self, here: Array, there: Array) -> Rectangles:
         """Return where boxes keep a vehicle away on a way from ``here`` to ``there`` (3,), m.

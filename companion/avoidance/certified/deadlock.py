@@ -78,6 +78,11 @@ class DeadlockTurn:
         return position + turned(offset, -self._sense * angle)
 
     @property
+    def overtime(self) -> bool:
+        """Whether there was no progress for longer than ``patience``."""
+        return self._waited > self._config.patience
+
+    @property
     def stalled(self) -> bool:
         """Whether there was no progress although the goal was turned by ``bend_more``."""
         config = self._config

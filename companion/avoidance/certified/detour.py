@@ -67,6 +67,10 @@ class Detour:
             self._search(now, here, there, choices)
         return Subgoal(goal, 0.0) if self._way is None else self._along(self._way, rest, goal)
 
+    def forget(self) -> None:
+        """Drop the way and the search of one."""
+        self._way = self._looking = None
+
     def _search(self, now: int, here: Array, there: Array, choices: Sequence[Discs]) -> None:
         if self._looking is None:
             if now < self._next_search:

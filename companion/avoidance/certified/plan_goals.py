@@ -23,7 +23,7 @@ from companion.avoidance.certified.told_goals import ToldGoals
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
 from companion.values.vectors import limit
-from companion.ways import way_of
+from companion.ways import space_detour_of, way_of
 from companion.ways.subgoal import Subgoal
 from mavlink_bridge.messages import Source
 from mavlink_bridge.wire.plan import WirePlan
@@ -58,6 +58,9 @@ class PlanGoals:
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
         least = from_surfaces(certified, config.field, limits) + BESIDE_M
         self._way = way_of(config, least, _EFFORT, BESIDE_M)
+        self._space = None
+        if self._way is None and not config.planar:
+            self._space = space_detour_of(config, least - BESIDE_M, sources.between, BESIDE_M)
         fastest = min(limits.v_max[:2]), min(limits.u_max[:2])
         self._anticipation = Anticipation(certified.anticipation, sources.between, *fastest, sense)
         self._fresh = certified.anticipation.fresh
@@ -80,6 +83,8 @@ class PlanGoals:
         """Work out what ways need at ``height`` (m), before the vehicle goes anywhere."""
         if self._way is not None:
             self._way.prepare(height)
+        if self._space is not None:
+            self._space.prepare()
 
     def chosen(
         self,
@@ -122,7 +127,8 @@ class PlanGoals:
             place = own[0, 0]
             # A sub-goal that is turned aside is not on the way any more, and may not be free.
             met = NOBODY if subgoal.beyond > 0.0 else met
-            goal = self._deadlock_turn.turned(place, goal, met.angle)
+            if self._space is None or not self._space.follows or self._deadlock_turn.overtime:
+                goal = self._deadlock_turn.turned(place, goal, met.angle)
             if met.ahead < inf:
                 goal = place + limit(goal - place, met.ahead)
         return subgoal, goal
@@ -132,10 +138,10 @@ class PlanGoals:
 
         That is the way around fixed obstacles, and a detour on it around what rests.
         """
-        way, detour = self._way, self._detour
-        begun = detour.begun, 0 if way is None else way.begun
+        way = self._way
+        begun = self._begun()
         if way is not None and self._deadlock_turn.stalled:
-            way.go_round(now, lambda: self._sources.at_rest(epoch, rest[2], self._agreements))
+            way.go_round(now, lambda: self._sources.at_rest(epoch, self._agreements))
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
         in_lane = self._lane_goals.subgoal(rest, destination, self._agreements.ends)
         if self._in_lane != (in_lane is not None):
@@ -143,16 +149,36 @@ class PlanGoals:
             self._deadlock_turn.restart()
         if in_lane is not None:
             return in_lane
-        subgoal = detour.towards(
+        subgoal = self._past_others(now, epoch, rest, goal.place)
+        if self._begun() != begun:
+            self._restart(rest, goes_round=way is None or way.goes_round or self._begun()[0] != begun[0])
+        return Subgoal(subgoal.place, subgoal.beyond + goal.beyond)
+
+    def _past_others(self, now: int, epoch: int, rest: Array, goal: Array) -> Subgoal:
+        """Return where to aim for on a detour around what rests: in space, or in the plane if there is none.
+
+        The plan ends at ``rest`` (3,) so far, on the way to ``goal`` (3,), m.
+        """
+        stalled = self._deadlock_turn.stalled
+        if self._space is not None:
+            subgoal = self._space.towards(
+                now, rest, goal, lambda: self._sources.at_rest(epoch, self._agreements), stalled=stalled
+            )
+            if not self._space.enclosed:
+                self._detour.forget()
+                return subgoal
+        return self._detour.towards(
             now,
             rest,
-            goal.place,
-            lambda: self._sources.resting(epoch, rest, goal.place, self._agreements),
-            stalled=self._deadlock_turn.stalled,
+            goal,
+            lambda: self._sources.resting(epoch, rest, goal, self._agreements),
+            stalled=stalled,
         )
-        if (detour.begun, 0 if way is None else way.begun) != begun:
-            self._restart(rest, goes_round=detour.begun != begun[0] or (way is not None and way.goes_round))
-        return Subgoal(subgoal.place, subgoal.beyond + goal.beyond)
+
+    def _begun(self) -> tuple[int, int]:
+        """Return how many detours and how many ways around fixed obstacles were begun."""
+        space, way = self._space, self._way
+        return self._detour.begun + (0 if space is None else space.begun), 0 if way is None else way.begun
 
     def _restart(self, rest: Array, *, goes_round: bool) -> None:
         """Measure progress anew on another way from ``rest`` (3,), m.

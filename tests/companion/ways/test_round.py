@@ -37,14 +37,14 @@ def test_clearances_among_balls_are_the_least_of_both(seed: int, high: float) ->
     alone = Clearance(wall(0.0), grid(LIMITS, 0.25, 150_000, 1.0), 0.8)
     before = alone.cells.copy()
     centres, radii = random.uniform(-4.0, 4.0, (4, 3)), random.uniform(0.1, 1.0, 4)
-    among = alone.among(Balls(centres, radii, high))
+    among = alone.among(Balls(centres, radii, np.full(4, 1.0 / high)))
     points = random.uniform(-5.0, 5.0, (200, 3))
     off = (points[:, None] - centres) / [1.0, 1.0, high]
     wanted = np.minimum(alone.at(points), (np.linalg.norm(off, axis=2) - radii).min(axis=1))
     assert np.allclose(among.at(points), wanted, atol=1e-12)
     assert np.allclose(among.cells, among.at(among.grid.places(np.arange(len(among.grid)))), atol=1e-12)
     assert (alone.cells == before).all()
-    assert np.isinf(Balls(np.zeros((0, 3)), np.zeros(0)).distance(points)).all()
+    assert np.isinf(Balls(np.zeros((0, 3)), np.zeros(0), np.zeros(0)).distance(points)).all()
 
 
 def follow(way: Way) -> Array:
@@ -63,11 +63,11 @@ def crosses(corners: Array) -> float:
 def test_a_way_goes_round_those_that_rest_and_comes_back_where_they_leave_none() -> None:
     way = Way(WayConfig(clearance=0.0, cell=0.1), wall(0.0, 4.0), LIMITS, 0.35, 10, planar=True)
     assert abs(crosses(follow(way))) < 0.6
-    first = Balls(np.array([[0.0, 0.0, 1.0]]), np.array([0.3]))
+    first = Balls(np.array([[0.0, 0.0, 1.0]]), np.array([0.3]), np.zeros(1))
     way.go_round(0, lambda: first)
     assert abs(crosses(follow(way)) - 4.0) < 0.6
     assert way.goes_round
-    both = Balls(np.array([[0.0, 0.0, 1.0], [0.0, 4.0, 1.0]]), np.array([0.3, 0.3]))
+    both = Balls(np.array([[0.0, 0.0, 1.0], [0.0, 4.0, 1.0]]), np.array([0.3, 0.3]), np.zeros(2))
     # Too early.
     way.go_round(4_999_999, lambda: both)
     assert abs(crosses(follow(way)) - 4.0) < 0.6

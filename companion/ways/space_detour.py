@@ -1,0 +1,143 @@
+"""Detour in space: a way past others that rest, over and under them, for a vehicle that makes no progress.
+
+Vehicles that have arrived may stand around the place where another one waits, or around its goal, with room
+between them in space only. Then a vehicle that makes no progress searches the shortest way on a grid of the
+box, past others that rest and past fixed obstacles, with less and less room. While the rest of the way is
+free of those that rest, it aims at about the furthest place of it that the end of its plan sees, until it
+sees the goal. A search is spread over plans, in parts that do not depend on the speed of the computer. Where
+two vehicles rest on the ways of each other, each goes round the other one on its own way. Only the cost of
+plans changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.config.obstacles import Obstacle
+from companion.config.planning import LimitsConfig
+from companion.values.horizon import Array
+from companion.ways.balls import Balls
+from companion.ways.clearance import Clearance, clearance_of
+from companion.ways.corners import along, lengths
+from companion.ways.finding import Found, finding
+from companion.ways.subgoal import Subgoal
+
+_EVERY_US, _AGAIN_US = 1_000_000, 5_000_000
+"""Shortest time (µs) between two searches, and after one without a way."""
+_MOVED_M = 0.5
+"""Distance by which the goal may move before the way is searched anew."""
+_PARTS = 12
+"""Parts of a search that a plan does, each of some tenths of a millisecond."""
+_ACROSS, _MOST_CELLS = 6.0, 150_000
+"""Cells that the least distance from others spans, and how many cells there are at most."""
+_BETWEEN = 0.25
+"""Distance of places on a way that are aimed at, as a share of the least distance from others."""
+_NARROW = 0.2
+"""Share of the wanted room with which a way is searched where there is none with all of it."""
+_SEEN = 0.1
+"""Share of the wanted room that a way must keep while it is followed: others move a little."""
+
+
+class SpaceDetour:
+    """Way of one vehicle past others, among ``obstacles`` within ``limits``.
+
+    ``kept`` (m): what plans keep from fixed obstacles; ``between`` (m): from others. ``room`` (m): wanted
+    beyond these distances.
+    """
+
+    def __init__(
+        self, obstacles: Sequence[Obstacle], limits: LimitsConfig, kept: float, between: float, room: float
+    ) -> None:
+        self._obstacles, self._limits = tuple(obstacles), limits
+        self._kept, self._room = kept, room
+        self._clearances = (kept + room, kept + _NARROW * room)
+        self._cell, self._spacing = between / _ACROSS, _BETWEEN * between
+        self._clear: Clearance | None = None
+        self._way: Array | None = None
+        self._search: Generator[None, None, Found | None] | None = None
+        self._next_search = 0
+        self.enclosed = False
+        """Whether the last search found no way."""
+        self.begun = 0
+        """Number of ways that were begun."""
+
+    def prepare(self) -> None:
+        """Work out the clearances of fixed obstacles, which take a tenth of a second or more with many."""
+        if self._clear is None:
+            self._clear = clearance_of(
+                self._obstacles, self._limits, self._cell, _MOST_CELLS, self._clearances[0]
+            )
+
+    @property
+    def follows(self) -> bool:
+        """Whether the last sub-goal is on a way."""
+        return self._way is not None
+
+    def towards(
+        self, now: int, rest: Array, goal: Array, others: Callable[[], Balls], *, stalled: bool
+    ) -> Subgoal:
+        """Return the sub-goal at ``now`` (µs) of a plan that ends at ``rest`` (3,) so far, towards ``goal``.
+
+        ``stalled``: there is no progress. ``others`` returns those that rest. Without a way it is the goal.
+        """
+        if self._way is None and self._search is None and not (stalled or self.enclosed):
+            return Subgoal(goal, 0.0)
+        balls = others()
+        # What a way must keep of those that rest, except where the two ends are nearer.
+        kept = self._kept + _SEEN * self._room
+        least = balls._replace(radii=balls.radii + kept).without(rest).without(goal)
+        if self._free(least, rest, goal[None])[0]:
+            self._way = self._search = None
+            self.enclosed = False
+            return Subgoal(goal, 0.0)
+        if self._follows(least, rest, goal):
+            self._search = None
+        else:
+            # Until the search ends the old way is followed: straight on leads back to where there was none.
+            self._go_on(now, rest, goal, balls)
+        if self._way is None:
+            return Subgoal(goal, 0.0)
+        return Subgoal(self._way[0], float(lengths(self._way)[-1]))
+
+    def _free(self, least: Balls, places: Array, ends: Array) -> NDArray[np.bool_]:
+        """Return whether the lines from ``places`` (k, 3) or (3,) to ``ends`` (k, 3), m, are free, (k,)."""
+        free = least.passed(places, ends)
+        if self._obstacles and self._clear is not None:
+            places = np.broadcast_to(places, ends.shape)
+            for k in np.flatnonzero(free).tolist():
+                free[k] = self._clear.sees(places[k], ends[k], self._kept)
+        return free
+
+    def _follows(self, least: Balls, rest: Array, goal: Array) -> bool:
+        """Return whether the way still leads to ``goal`` (3,), m; drop the places that lie behind."""
+        if self._way is None or float(np.abs(self._way[-1] - goal).max()) > _MOVED_M:
+            return False
+        seen = np.flatnonzero(self._free(least, rest, self._way))
+        if not len(seen):
+            return False
+        self._way = self._way[int(seen[-1]) :]
+        return bool(self._free(least, self._way[:-1], self._way[1:]).all())
+
+    def _go_on(self, now: int, rest: Array, goal: Array, balls: Balls) -> None:
+        """Search a way from ``rest`` to ``goal`` (3,), m, past ``balls``."""
+        if self._search is None:
+            if now < self._next_search:
+                return
+            self.prepare()
+            assert self._clear is not None
+            self._search = finding(self._clear.among(balls), self._clearances, rest, goal)
+        for _ in range(_PARTS):
+            try:
+                next(self._search)
+            except StopIteration as end:
+                found: Found | None = end.value
+                self._search, self._way = None, None
+                self._next_search = now + (_AGAIN_US if found is None else _EVERY_US)
+                self.enclosed = found is None
+                if found is not None:
+                    self._way = along(found.corners, self._spacing)[1:]
+                    self.begun += 1
+                return
