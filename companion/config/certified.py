@@ -138,6 +138,13 @@ class CertifiedConfig(Settings):
     repeat_us: int = Field(
         50_000, gt=0, le=2_000_000, multiple_of=4, description="µs between two transmissions of a plan"
     )
+    repeat_in_loss: float = Field(
+        2.5,
+        ge=1.0,
+        le=5.0,
+        description="how many times as often plans are transmitted while four of five transmissions of others"
+        " are lost; 1: never more often",
+    )
     lead_us: int = Field(
         60_000,
         gt=0,

@@ -34,6 +34,8 @@ _REPORTED_US = 5_000_000
 
 Nothing of a sender of another fleet is accepted in this time.
 """
+_HEARD_US = 5_000_000
+"""Time (µs) after the last plan or statement of a peer during which its lost plans are counted."""
 
 
 class Agreements:
@@ -273,6 +275,23 @@ class Agreements:
             for system, peer in self._distant.items()
             if peer.last_received is not None and peer.left is None and not peer.away
         }
+
+    def received(self, now: int, count: int) -> float | None:
+        """Return the share of the last ``count`` epochs of which a plan arrived, at ``now`` (µs).
+
+        It is the mean over the peers that were heard lately, without departed ones and those that
+        another controller flies. None without such a peer, or if all are known for less time.
+        """
+        shares = [
+            share
+            for peer in self._peers.values()
+            if peer.left is None
+            and not peer.away
+            and peer.last_received is not None
+            and now - peer.last_received <= _HEARD_US
+            and (share := peer.plans.share(self._config.epoch_us, count)) is not None
+        ]
+        return sum(shares) / len(shares) if shares else None
 
     @property
     def away(self) -> frozenset[int]:

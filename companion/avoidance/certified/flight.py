@@ -21,6 +21,7 @@ from companion.avoidance.certified.places import Places
 from companion.avoidance.certified.plan_goals import PlanGoals
 from companion.avoidance.certified.plan_sides import plan_sides
 from companion.avoidance.certified.qp import Objective, SeparationQp
+from companion.avoidance.certified.repetition import EPOCHS, Repetition
 from companion.avoidance.certified.reservation import Reservation
 from companion.avoidance.certified.told_goals import ToldGoals
 from companion.avoidance.certified.vicinity import Vicinity
@@ -80,6 +81,7 @@ class CertifiedFlight:
         self.reservation = Reservation(
             certified, self.commitment, self.agreements, beside(certified, config.field, config.limits)
         )
+        self._repetition = Repetition(certified)
         self.clocks = ClockWatch(own, certified.clock_us)
         self._column_within = max(config.guard.tube, certified.drift)
         # The feed-forward of set-points needs the next plan before the lag of the attitude reaches it.
@@ -385,10 +387,10 @@ class CertifiedFlight:
         """Return the messages for the swarm link now.
 
         They are TIMESYNC messages; the newest plan with a statement of all agreements, at once and then every
-        ``repeat_us``; and a statement of the agreements that changed. ``farewell``: the vehicle makes no
-        further plan; the statement says so once the vehicle flies the last one. Without ``farewell``, call
-        ``due`` or ``stand`` at ``now`` first: otherwise the vehicle counts as not in control, and no plan is
-        announced.
+        ``repeat_us``, or more often in heavy loss (``Repetition``); and a statement of the agreements that
+        changed. ``farewell``: the vehicle makes no further plan; the statement says so once the vehicle flies
+        the last one. Without ``farewell``, call ``due`` or ``stand`` at ``now`` first: otherwise the vehicle
+        counts as not in control, and no plan is announced.
         """
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()
@@ -403,8 +405,10 @@ class CertifiedFlight:
         self._agree(now)
         if announced.epoch == self.commitment.announced_until and now < self._next_announcement:
             return [*sync, *self._statements(announced.epoch, every=False)] if not farewell else sync
+        if announced.epoch != self.commitment.announced_until:
+            self._repetition.update(now, self.agreements.received(now, EPOCHS))
         self.commitment.announced_until = announced.epoch
-        self._next_announcement = now + self._config.certified.repeat_us
+        self._next_announcement = now + self._repetition.period
         self._announced = True
         self._participated = not farewell
         if farewell:

@@ -79,6 +79,19 @@ class PlanFile:
         self._plans.clear()
         self.newest = None
 
+    def share(self, length: int, count: int) -> float | None:
+        """Return the share that is filed of the plans of ``count`` epochs, of ``length`` (µs) each.
+
+        They are those before the newest plan, which is filed in any case. None if the oldest plan that is
+        filed began later. ``count`` is at most ``_RECENT``.
+        """
+        if self.newest is None:
+            return None
+        last = self.newest.plan.epoch
+        if min(self._plans) > last - count * length:
+            return None
+        return sum(last - back * length in self._plans for back in range(1, count + 1)) / count
+
     def get(self, epoch: int) -> StoredPlan | None:
         """Return the plan of ``epoch`` (µs), if it is filed."""
         return self._plans.get(epoch)

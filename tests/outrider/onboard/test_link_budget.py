@@ -160,9 +160,26 @@ def test_more_vehicles_have_more_to_agree_on() -> None:
         assert need[0] <= room(baud) < need[1]
 
 
+@pytest.mark.parametrize("factor", [1.0, 2.5, 5.0])
+def test_in_loss_plans_take_what_a_shorter_period_takes(factor: float) -> None:
+    def of(**certified: float) -> CompanionConfig:
+        document = {"task": "goto", "avoidance": "certified", "certified": certified}
+        return CompanionConfig.model_validate(document)
+
+    faster = of(repeat_us=50_000 / factor)
+    for vehicles in (2, 8, 16):
+        in_loss = said(of(repeat_in_loss=factor), False, vehicles, in_loss=True)
+        assert in_loss == said(faster, False, vehicles)
+        # Changes of agreements are stated once, however often plans are.
+        assert in_loss <= factor * said(of(), False, vehicles)
+
+
 def test_a_line_for_agreements_is_doubted_by_their_settings() -> None:
     config = CompanionConfig(task="goto", avoidance="certified")
-    assert "companion.certified" in doubts(Serial("/dev/ttyUSB0", 460800), config, False)
+    doubted = doubts(Serial("/dev/ttyUSB0", 460800), config, False)
+    assert "companion.certified" in doubted
+    vehicles = carried(460800, config, False)
+    assert f"sends {said(config, False, vehicles, in_loss=True):.0f} bytes/s (repeat_in_loss)" in doubted
     with pytest.raises(InputError, match=r"too few for two vehicles.*repeat_us"):
         doubts(Serial("/dev/ttyUSB0", 57600), config, False)
 

@@ -80,15 +80,16 @@ _USB: Final = "ttyACM"
 """Part of the name of USB serial devices, whose baud rate has no effect."""
 
 
-def said(config: CompanionConfig, signed: bool, vehicles: int = FLEET) -> float:
+def said(config: CompanionConfig, signed: bool, vehicles: int = FLEET, *, in_loss: bool = False) -> float:
     """Return the maximum bytes per second of one companion of ``vehicles`` on the swarm link.
 
+    ``in_loss``: while most transmissions are lost, see ``agreed``.
     They are states, plans, forwarded detections, heartbeats and, in certified mode, all of ``agreed``.
     MAVLink 2 truncates zeros at the end of a message, so a vehicle at rest sends less.
     """
     rates = config.rates
     if config.avoidance == "certified":
-        plans = agreed(config, signed, vehicles)
+        plans = agreed(config, signed, vehicles, in_loss=in_loss)
     else:
         plans = _size(_PLAN, signed) * _SECOND / rates.plan_us if config.shares_plan else 0.0
     states = _size(_STATE, signed) * _SECOND / rates.state_us
@@ -104,16 +105,18 @@ def _detections(config: CompanionConfig, signed: bool) -> float:
     return pair * _SECOND / config.rates.detection_us
 
 
-def agreed(config: CompanionConfig, signed: bool, vehicles: int) -> float:
+def agreed(config: CompanionConfig, signed: bool, vehicles: int, *, in_loss: bool = False) -> float:
     """Return the maximum bytes per second of plans, statements of agreements and TIMESYNC in certified mode.
 
-    The plan and a statement of all agreements go once in ``repeat_us``. The first statement of an epoch has
+    The plan and a statement of all agreements go once in ``repeat_us``, and ``in_loss``, while most
+    transmissions are lost, ``repeat_in_loss`` times as often. The first statement of an epoch has
     two agreements with each of the other ``vehicles``, the old and the new one; that the new one replaces the
     old one is stated to each of them at once. Lost messages are not counted: with 40 % loss and 80 ms of
     delay, eight vehicles send twice as much, because more plans and agreements are open.
     """
     certified, peers = config.certified, vehicles - 1
-    announcements = ceil(certified.epoch_us / certified.repeat_us)
+    period = certified.repeat_us / (certified.repeat_in_loss if in_loss else 1.0)
+    announcements = ceil(certified.epoch_us / period)
     old, both, one = (_stated(count, number, signed) for count, number in ((peers, 1), (peers, 2), (1, 1)))
     epoch = announcements * _size(_PLAN, signed) + both + (announcements - 1) * old + peers * one
     clocks = vehicles * _size(_TIMESYNC, signed) * _SECOND / _TIMESYNC_US
@@ -161,7 +164,8 @@ def doubts(endpoint: Endpoint, config: CompanionConfig, signed: bool) -> str:
     has = f"--swarm {endpoint}: has {room(endpoint.baud):.0f} bytes/s as a shared radio"
     if config.avoidance == "certified":
         slower = "a faster line, or longer epoch_us and repeat_us of companion.certified"
-        enough = f"take {slower}"
+        more = said(config, signed, max(vehicles, 2), in_loss=True)
+        enough = f"take {slower}; while most messages are lost each sends {more:.0f} bytes/s (repeat_in_loss)"
     else:
         rates = "radio: 57600 in the file, or state_us and plan_us of companion.rates"
         slower, enough = f"a faster line, or slower rates: {rates}", "write radio: 57600 in the file"

@@ -66,6 +66,7 @@ OF_ONE: dict[str, dict[str, Any]] = {
     "box": {"limits": {"box_min": [-9.0, -9.0, 2.0]}},
     "strangers": {"certified": {"noncooperative_speed": 3.0, "noncooperative_acceleration": 2.0}},
     "cost": {"certified": {"omega_field": 0.1, "spare": 0.02}},
+    "repetition": {"certified": {"repeat_in_loss": 1.0}},
     "times": {"certified": {"repeat_us": 40_000, "lead_us": 40_000, "gone_us": 500_000, "last_call_us": 0}},
     "sources": {"certified": {"time_sources": {"autopilot_us": 9, "drift_ppm": 1, "wrong": 0}}},
     "field": {"field": {"gain": 5.0, "d_safe": 4.0, "margin_sigmas": 3.0}},
