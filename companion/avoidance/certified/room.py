@@ -85,6 +85,9 @@ class Room:
     def _place(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array | None:
         """Return the place to stand at while ``goal`` (3,), m, is in a corridor; None if it is in none."""
         asking = self._asking(now, goal)
+        if not asking:
+            self._rank = 0
+            return None
         ends = agreements.ends()
         wide = [self._corridor(one, ends.get(system), goal, _WIDE) for system, one in asking]
         counted = [index for index, discs in enumerate(wide) if covered(goal[:2], discs.centres, discs.radii)]
