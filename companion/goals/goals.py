@@ -196,6 +196,7 @@ class Goals:
     ) -> Aim:
         """Return the aim of the present phase and task, before ``cautious`` shortens it."""
         target, phase, task = view.target, self._pilot.phase, self._config.task
+        given = False
         if phase is Phase.RETURN:
             place = self._way_back(now, measured)
         elif phase is Phase.SETTLE:
@@ -205,12 +206,13 @@ class Goals:
         elif phase is not Phase.HOLD and task == "goto":
             began = measured.position if self._began is None else self._began
             place = began if self.goal is None else self._above_floor(self.goal)
+            given = self.goal is not None
         elif phase is not Phase.HOLD and target is not None:
             return self._around(now, target, measured, mates, sight)
         else:
             # Ordered to hold, or there is no target: hold the position.
             place = self._place_to_hold(measured)
-        return standing(place, None if target is None else target.position)
+        return standing(place, None if target is None else target.position)._replace(given=given)
 
     def _around(self, now: int, target: State, measured: Motion, mates: Mates, sight: Sight) -> Aim:
         """Return the aim on the surface around the target's position at the end of the horizon."""

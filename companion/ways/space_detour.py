@@ -57,6 +57,7 @@ class SpaceDetour:
         self._cell, self._spacing = between / _ACROSS, _BETWEEN * between
         self._clear: Clearance | None = None
         self._way: Array | None = None
+        self._goal: Array | None = None
         self._search: Generator[None, None, Found | None] | None = None
         self._next_search = 0
         self.enclosed = False
@@ -83,6 +84,10 @@ class SpaceDetour:
 
         ``stalled``: there is no progress. ``others`` returns those that rest. Without a way it is the goal.
         """
+        if self._goal is not None and float(np.abs(goal - self._goal).max()) > _MOVED_M:
+            self._way = self._search = None
+            self.enclosed = False
+        self._goal = goal
         if self._way is None and self._search is None and not (stalled or self.enclosed):
             return Subgoal(goal, 0.0)
         balls = others()
@@ -93,7 +98,9 @@ class SpaceDetour:
             self._way = self._search = None
             self.enclosed = False
             return Subgoal(goal, 0.0)
-        if self._follows(least, rest, goal):
+        # A way that ends beside a goal that has moved a little does not lead there.
+        ends = stalled and self._way is not None and len(self._way) == 1
+        if not ends and self._follows(least, rest, goal):
             self._search = None
         else:
             # Until the search ends the old way is followed: straight on leads back to where there was none.

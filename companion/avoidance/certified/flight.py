@@ -235,6 +235,7 @@ class CertifiedFlight:
 
     def _hold_column(self, now: int) -> bool:
         """Continue the plan, as a column; return whether the plan of the next epoch was made now."""
+        self._told.tell(None)
         turned = self._take_part(now)
         if turned:
             self.commitment.raise_column()
@@ -257,6 +258,7 @@ class CertifiedFlight:
         wrong = not self.clocks.wrong.isdisjoint(self.agreements.members)
         if wrong or self.agreements.missing() or self._listens(now):
             if self.commitment.last_call(now):
+                self._told.ask_no_room()
                 self.commitment.carry_on(HoldReason.CLOCK if wrong else HoldReason.MISSING)
             return False
         epoch = self.commitment.epoch(now)
@@ -309,6 +311,7 @@ class CertifiedFlight:
 
     def anchor(self, now: int, measured: Motion) -> None:
         """Plan anew from the ``measured`` motion; all agreements are void (``Commitment.anchor``)."""
+        self._told.ask_no_room()
         self.agreements.begin(self.commitment.anchor(now, measured))
 
     def watch(self, now: int, measured: Motion) -> None:
@@ -353,7 +356,7 @@ class CertifiedFlight:
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
         destination = self._places.destination(epoch, own[-1, 2], aim, self.agreements)
-        given = destination is aim.destination
+        given = aim.given and destination is aim.destination
         moving = aim.path is not None
         subgoal, goal = self._goals.chosen(now, epoch, start, own, destination, given=given, moving=moving)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)

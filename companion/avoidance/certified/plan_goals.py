@@ -1,8 +1,9 @@
 """Where a plan should end: the destination, or a place that vehicles and obstacles leave free before it.
 
-In turn: a way around fixed obstacles (``ways``), a step in a lane (``lane_goals``), a detour around what
-rests (``detour``), the turn of a goal that is pushed back (``deadlock``), and the turn before encounters that
-are predicted (``anticipation``). All change only the cost of a plan.
+In turn: a place beside the corridors of others (``room``), a way around fixed obstacles (``ways``), a step in
+a lane (``lane_goals``), a detour around what rests (``space_detour``, ``detour``), the turn of a goal that is
+pushed back (``deadlock``), and the turn before encounters that are predicted (``anticipation``). All change
+only the cost of a plan.
 """
 
 from __future__ import annotations
@@ -100,8 +101,9 @@ class PlanGoals:
         """Return the sub-goal on the way to ``destination`` (3,), m, and where to aim for it, (3,), m.
 
         ``epoch``: that of ``now``, µs; ``start``: beginning of the plan; ``own`` (n, 3, 3), m: the committed
-        plan, carried on. A destination that is ``moving`` is not told to others. One that is not ``given``
-        but another place in its stead depends on where others rest: no room is asked for and made there.
+        plan, carried on. A destination that is ``moving`` is not told to others. One that is not ``given`` is
+        a place to hold, or another place in the stead of a goal, which depends on where others rest: no room
+        is asked for and made there.
         """
         anticipates = self._anticipates and not moving
         rest, stalled = own[-1, 2], self._deadlock_turn.stalled
@@ -119,7 +121,7 @@ class PlanGoals:
             tells = anticipates or asked is not None
             self._told.tell(destination if tells else None, room=asked)
         if anticipates:
-            met = self._met(now, start, destination)
+            met = self._met(now, start, aim)
         else:
             self._anticipation.restart()
             met = NOBODY
@@ -138,9 +140,9 @@ class PlanGoals:
 
         That is the way around fixed obstacles, and a detour on it around what rests.
         """
-        way = self._way
+        way, stalled = self._way, self._deadlock_turn.stalled
         begun = self._begun()
-        if way is not None and self._deadlock_turn.stalled:
+        if way is not None and stalled:
             way.go_round(now, lambda: self._sources.at_rest(epoch, self._agreements))
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
         in_lane = self._lane_goals.subgoal(rest, destination, self._agreements.ends)
@@ -151,7 +153,7 @@ class PlanGoals:
             return in_lane
         subgoal = self._past_others(now, epoch, rest, goal.place)
         if self._begun() != begun:
-            self._restart(rest, goes_round=way is None or way.goes_round or self._begun()[0] != begun[0])
+            self._restart(rest, counts=stalled or (way is not None and way.goes_round))
         return Subgoal(subgoal.place, subgoal.beyond + goal.beyond)
 
     def _past_others(self, now: int, epoch: int, rest: Array, goal: Array) -> Subgoal:
@@ -180,13 +182,14 @@ class PlanGoals:
         space, way = self._space, self._way
         return self._detour.begun + (0 if space is None else space.begun), 0 if way is None else way.begun
 
-    def _restart(self, rest: Array, *, goes_round: bool) -> None:
+    def _restart(self, rest: Array, *, counts: bool) -> None:
         """Measure progress anew on another way from ``rest`` (3,), m.
 
         Where a way is lost and found again at the same place, as at a corner of an obstacle beside which
-        somebody rests, that is no progress, unless the new one ``goes_round`` what rests.
+        somebody rests, or in a gap that opens and closes, that is no progress. It ``counts`` in any case if
+        it was searched because there was none.
         """
-        if goes_round or self._began_at is None or float(np.abs(rest - self._began_at).max()) > _MOVED_M:
+        if counts or self._began_at is None or float(np.abs(rest - self._began_at).max()) > _MOVED_M:
             self._began_at = rest.copy()
             self._deadlock_turn.restart()
 

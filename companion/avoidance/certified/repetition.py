@@ -10,6 +10,8 @@ rise. Then the vehicle returns to the usual period for some time: it adds no loa
 
 from __future__ import annotations
 
+from math import ceil
+
 from companion.config.certified import CertifiedConfig
 
 EPOCHS = 10
@@ -32,7 +34,9 @@ class Repetition:
     def __init__(self, config: CertifiedConfig) -> None:
         self._usual = config.repeat_us
         self._factor = config.repeat_in_loss
-        self._number = config.epoch_us / config.repeat_us
+        self._number = ceil(config.epoch_us / config.repeat_us)
+        self._shorter = round(config.repeat_us / config.repeat_in_loss)
+        self._more = ceil(config.epoch_us / self._shorter)
         self.period = self._usual
         self._least = 1.0
         self._tried_until = self._rests_until = 0
@@ -43,9 +47,9 @@ class Repetition:
             return
         if self.period == self._usual:
             if share is not None and now >= self._rests_until and share < 1.0 - _HEAVY**self._number:
-                self.period = round(self._usual / self._factor)
+                self.period = self._shorter
                 self._least, self._tried_until = share, now + _TRIAL_US
-        elif share is None or share > 1.0 - _LIGHT ** (self._number * self._factor):
+        elif share is None or share > 1.0 - _LIGHT**self._more:
             self.period = self._usual
         else:
             # The share decreases further for some time where the loss has only begun.
@@ -58,4 +62,4 @@ class Repetition:
     def _rise(self) -> float:
         """Return by how much the shorter period raises the least share where losses are independent."""
         lost = 1.0 - self._least
-        return float(lost - lost**self._factor)
+        return float(lost - lost ** (self._more / self._number))

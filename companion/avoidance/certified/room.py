@@ -27,13 +27,14 @@ from mavlink_bridge.wire.goal import WireGoal, WireRoom, room_to
 _REACHED_M = 0.2
 """Distance of the end of the plan from a goal that counts as reached, and by which a goal may move."""
 _WIDE, _KEPT = 1.1, 1.03
-"""Half width of a corridor in least distances of plans: for a new place beside it, and for the one that it
-has."""
+"""Half width of a corridor in least distances of plans: for a new place beside it, and for the place where a
+vehicle already stands."""
 _LONG = 2.0
 """Longest corridor in least distances of plans."""
 _PART = 0.3
 """Distance of the discs that make a corridor, in least distances of plans."""
 _MOST_RANK = 7
+"""Rank from which on nobody stands aside."""
 
 
 class Room:
@@ -47,7 +48,7 @@ class Room:
         self._low, self._high = np.array(limits.box_min[:2]), np.array(limits.box_max[:2])
         self._planar, self._downwash = config.planar, config.field.downwash
         self._goal: Array | None = None
-        self._reached = self._asks = False
+        self._reached = self._there = self._asks = False
         self._aside: Array | None = None
         self._rank = 0
         self.moved = False
@@ -58,13 +59,14 @@ class Room:
 
         These are the corridors of those that ask. The plan of ``epoch`` (µs) ends at ``rest`` (3,), m.
         """
+        before = self._aside
         if self._goal is None or float(np.abs(self._goal - goal).max()) > _REACHED_M:
             self._reached = self._asks = False
+            self._rank, self._aside = 0, None
         self._goal = goal
-        there = float(np.abs(rest - goal).max()) < _REACHED_M
-        self._reached |= there
-        self._asks &= not there
-        before = self._aside
+        self._there = float(np.abs(rest - goal).max()) < _REACHED_M
+        self._reached |= self._there
+        self._asks &= not self._there
         self._aside = self._place(now, epoch, rest, goal, agreements) if self._reached else None
         self.moved = before is not self._aside
         return goal if self._aside is None else self._aside
@@ -74,7 +76,7 @@ class Room:
 
         ``stalled``: it makes no progress. It asks until it is at its goal.
         """
-        self._asks |= stalled
+        self._asks |= stalled and not self._there
         if self._aside is not None and self._rank == 0:
             return None
         if not self._asks and self._aside is None:
@@ -106,19 +108,22 @@ class Room:
                 seen = np.flatnonzero(free(rest[:2], places, without(rest[:2], discs)))
                 if len(seen):
                     found, first = places[seen[0]], asking[counted[0]][1].room
-                    self._rank = min(first.rank + 1, _MOST_RANK) if rank and first is not None else 0
-                    return np.array([found[0], found[1], goal[2]])
+                    self._rank = first.rank + 1 if rank and first is not None else 0
+                    place = np.array([found[0], found[1], goal[2]])
+                    aside = self._aside
+                    stays = aside is not None and float(np.abs(aside - place).max()) < _REACHED_M
+                    return aside if stays else place
         return self._aside
 
     def _asking(self, now: int, goal: Array) -> list[tuple[int, WireGoal]]:
-        """Return those that ask for room before this vehicle, by system id, lower ranks first.
+        """Return those that ask for room before this vehicle: system id and message, the lowest rank first.
 
         Not those whose goal is so near to the own ``goal`` (3,), m, that both cannot be reached.
         """
-        mine = (self._rank, self._own) if self._aside is not None and self._rank else (inf, self._own)
+        mine = (self._rank if self._asks or self._rank else inf, self._own)
         found = []
         for system, one in self._told.recent(now).items():
-            if one.room is None or (one.room.rank, system) >= mine:
+            if one.room is None or one.room.rank >= _MOST_RANK or (one.room.rank, system) >= mine:
                 continue
             off = self._off(one.position_m - goal)
             if one.room.rank or float(off @ off) >= self._sources.between**2:
@@ -134,8 +139,9 @@ class Room:
         room = asking.room
         places = []
         if room is not None:
-            last = room.next_place_m
-            first = last if end is None else end
+            first = room.next_place_m if end is None else end
+            # What others tell is not bounded.
+            last = first + limit(room.next_place_m - first, _LONG * between)
             length = float(np.linalg.norm(last - first))
             parts = max(1, int(length / (_PART * between)))
             places = [first + share * (last - first) for share in np.linspace(0.0, 1.0, parts + 1)]

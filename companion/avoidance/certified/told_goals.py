@@ -48,6 +48,10 @@ class ToldGoals:
         """
         self._goal, self._room = None if goal is None else (goal, reached), room
 
+    def ask_no_room(self) -> None:
+        """Ask for no room from now on, because no plan is made; the goal is told as before."""
+        self._room = None
+
     def messages(self) -> list[Message]:
         """Return the message of the own goal, if it is told."""
         if self._goal is None:

@@ -36,7 +36,8 @@ class Aim(NamedTuple):
     that vehicles that share the surface shall keep; ∞ where it is not shared. ``path`` gives the places and
     velocities of a destination that moves after times (n,), s, from now; None for one at rest. ``clear``:
     no fixed obstacle is between the vehicle and x̌, which is on a way around them. ``bounds``: what the speed
-    of the plan keeps beside unheard neighbours; None if all are heard.
+    of the plan keeps beside unheard neighbours; None if all are heard. ``given``: x̌ is a goal that the
+    vehicle was given, and not a place to hold, to return to or to settle at.
     """
 
     destination: Array
@@ -48,6 +49,7 @@ class Aim(NamedTuple):
     path: Callable[[Array], tuple[Array, Array]] | None = None
     clear: bool = False
     bounds: SpeedBounds | None = None
+    given: bool = False
 
 
 def standing(goal: Array, target: Array | None = None) -> Aim:

@@ -173,7 +173,7 @@ def test_two_goals_of_which_only_one_can_be_reached_are_not_given_up() -> None:
 
 
 def test_the_place_is_free_of_those_that_rest_and_of_posts_and_inside_the_box() -> None:
-    rng = np.random.default_rng(3)
+    rng, free = np.random.default_rng(3), 0
     for _ in range(20):
         others = ORIGIN + np.column_stack([rng.uniform(-4.0, 4.0, (5, 2)), np.zeros(5)])
         posts = [{"kind": "post", "at": tuple(at), "radius": 0.3} for at in rng.uniform(-4.0, 4.0, (2, 2))]
@@ -187,7 +187,9 @@ def test_the_place_is_free_of_those_that_rest_and_of_posts_and_inside_the_box() 
         for post in posts:
             assert np.linalg.norm(place[:2] - np.array(post["at"])) > 0.3 + standing.config.field.d_min
         if standing.asks(place, place) is None:
+            free += 1
             assert np.linalg.norm(others - place, axis=1).min() > standing.d
+    assert free > 3
 
 
 def test_without_a_free_place_it_asks_for_room_with_a_rank_one_higher() -> None:
@@ -244,3 +246,81 @@ def test_a_vehicle_asks_once_it_makes_no_progress_until_it_is_at_its_goal() -> N
     assert standing.asks(rest + EAST, ORIGIN) is not None
     standing.place(2, ORIGIN)
     assert standing.asks(ORIGIN, ORIGIN) is None
+
+
+def test_a_rank_ends_with_the_goal_for_which_room_was_made() -> None:
+    d = Standing(ORIGIN).d
+    standing = Standing(ORIGIN, ring(12, 1.4 * d))
+    standing.place(0)
+    across(standing, rank=2)
+    standing.place(0)
+    standing.here = ORIGIN + 20.0 * EAST
+    assert standing.place(0, ORIGIN) is standing.here
+    asked = standing.asks(ORIGIN, standing.here, stalled=True)
+    assert asked is not None
+    assert asked.rank == 0
+
+
+@pytest.mark.parametrize("ids", [(11, 12), (12, 11)])
+def test_of_two_that_return_to_their_goals_head_on_one_stands_aside_and_neither_changes_its_mind(
+    ids: tuple[int, int],
+) -> None:
+    """Both have been at their goals, were pushed off, and ask for room on the way back."""
+    d = Standing(ORIGIN).d
+    homes = ORIGIN, ORIGIN + 1.05 * d * EAST
+    two = [Standing(home, own=own) for home, own in zip(homes, ids, strict=True)]
+    rests = ORIGIN + 1.4 * d * EAST, ORIGIN - 0.4 * d * EAST
+    for one in two:
+        one.place(0)
+    moved = [0, 0]
+    for now in range(0, 4_000_000, 200_000):
+        places = [one.place(now, rest) for one, rest in zip(two, rests, strict=True)]
+        for k, (one, other) in enumerate(zip(two, two[::-1], strict=True)):
+            moved[k] += one.room.moved
+            asked = one.asks(rests[k], places[k], stalled=now == 0)
+            if asked is not None:
+                other.ask(now, ids[k], rests[k], asked.next_place_m, one.here, asked.rank)
+    assert sum(place is not one.here for place, one in zip(places, two, strict=True)) == 1
+    assert max(moved) <= 1
+
+
+def test_a_place_for_the_first_of_several_is_kept() -> None:
+    """Corridors from all sides leave no place for all: there is one for the lowest rank."""
+    d = Standing(ORIGIN).d
+    limits = {"box_min": (-1.2 * d, -1.2 * d, 0.5), "box_max": (1.2 * d, 1.2 * d, 10.0)}
+    standing = Standing(ORIGIN, limits=limits)
+    standing.place(0)
+    across(standing, rank=0)
+    for system, angle in enumerate(np.linspace(0.3, 2.8, 5), 12):
+        way = d * np.array([np.cos(angle), np.sin(angle), 0.0])
+        standing.ask(0, system, ORIGIN - way, ORIGIN + way, FAR, 1)
+    place = standing.place(0)
+    assert beside(place) > d
+    for _ in range(5):
+        assert standing.place(0, place) is place
+        assert not standing.room.moved
+
+
+@pytest.mark.parametrize("rank", [7, 8, 255])
+def test_for_ranks_of_seven_and_more_nobody_stands_aside(rank: int) -> None:
+    standing = Standing(ORIGIN)
+    standing.place(0)
+    across(standing, rank=rank)
+    assert standing.place(0) is ORIGIN
+
+
+def test_a_next_place_far_away_counts_up_to_the_length_of_a_corridor() -> None:
+    """What others tell is not bounded: up to 2147 km on the wire."""
+    standing = Standing(ORIGIN)
+    standing.place(0)
+    standing.ask(0, 11, ORIGIN - 2.5 * standing.d * EAST, ORIGIN + 2e6 * EAST, FAR)
+    assert standing.place(0) is not ORIGIN
+    standing.ask(0, 11, ORIGIN - 3.5 * standing.d * EAST, ORIGIN + 2e6 * EAST, FAR)
+    assert standing.place(0) is ORIGIN
+
+
+def test_it_does_not_ask_at_its_goal() -> None:
+    standing = Standing(ORIGIN)
+    near = ORIGIN + 0.15 * EAST
+    standing.place(0, near)
+    assert standing.asks(near, ORIGIN, stalled=True) is None
