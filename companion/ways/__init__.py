@@ -28,15 +28,15 @@ def way_of(config: CompanionConfig, least: float, effort: int = 1, spare: float 
     return Way(config.way, _obstacles(config), limits, least, parts, planar=config.planar, spare=spare)
 
 
-def space_detour_of(config: CompanionConfig, kept: float, between: float, room: float) -> SpaceDetour:
+def space_detour_of(config: CompanionConfig, kept: float, between: float, spare: float) -> SpaceDetour:
     """Return the detours in space of a vehicle with ``config``.
 
-    ``kept`` (m): what plans keep from fixed obstacles; ``between`` (m): from others. ``room`` (m): wanted
+    ``kept`` (m): what plans keep from fixed obstacles; ``between`` (m): from others. ``spare`` (m): wanted
     beyond these distances. The search is loaded only here.
     """
     from companion.ways.space_detour import SpaceDetour
 
-    return SpaceDetour(_obstacles(config), config.limits.within(config.field.margin(1)), kept, between, room)
+    return SpaceDetour(_obstacles(config), config.limits.within(config.field.margin(1)), kept, between, spare)
 
 
 def _obstacles(config: CompanionConfig) -> list[Obstacle]:

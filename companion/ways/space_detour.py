@@ -30,30 +30,32 @@ _EVERY_US, _AGAIN_US = 1_000_000, 5_000_000
 _MOVED_M = 0.5
 """Distance by which the goal may move before the way is searched anew."""
 _PARTS = 12
-"""Parts of a search that a plan does, each of some tenths of a millisecond."""
+"""Parts of a search that a plan does, of some tenths of a millisecond; the last one may take longer."""
+_LOOKED = 40
+"""Number of the next places on a way that a plan looks at."""
 _ACROSS, _MOST_CELLS = 6.0, 150_000
 """Cells that the least distance from others spans, and how many cells there are at most."""
 _BETWEEN = 0.25
 """Distance of places on a way that are aimed at, as a share of the least distance from others."""
 _NARROW = 0.2
-"""Share of the wanted room with which a way is searched where there is none with all of it."""
+"""Share of ``spare`` with which a way is searched where there is none with all of it."""
 _SEEN = 0.1
-"""Share of the wanted room that a way must keep while it is followed: others move a little."""
+"""Share of ``spare`` that a way must keep while it is followed: others move a little."""
 
 
 class SpaceDetour:
     """Way of one vehicle past others, among ``obstacles`` within ``limits``.
 
-    ``kept`` (m): what plans keep from fixed obstacles; ``between`` (m): from others. ``room`` (m): wanted
+    ``kept`` (m): what plans keep from fixed obstacles; ``between`` (m): from others. ``spare`` (m): wanted
     beyond these distances.
     """
 
     def __init__(
-        self, obstacles: Sequence[Obstacle], limits: LimitsConfig, kept: float, between: float, room: float
+        self, obstacles: Sequence[Obstacle], limits: LimitsConfig, kept: float, between: float, spare: float
     ) -> None:
         self._obstacles, self._limits = tuple(obstacles), limits
-        self._kept, self._room = kept, room
-        self._clearances = (kept + room, kept + _NARROW * room)
+        self._kept, self._spare = kept, spare
+        self._clearances = (kept + spare, kept + _NARROW * spare)
         self._cell, self._spacing = between / _ACROSS, _BETWEEN * between
         self._clear: Clearance | None = None
         self._way: Array | None = None
@@ -92,7 +94,7 @@ class SpaceDetour:
             return Subgoal(goal, 0.0)
         balls = others()
         # What a way must keep of those that rest, except where the two ends are nearer.
-        kept = self._kept + _SEEN * self._room
+        kept = self._kept + _SEEN * self._spare
         least = balls._replace(radii=balls.radii + kept).without(rest).without(goal)
         if self._free(least, rest, goal[None])[0]:
             self._way = self._search = None
@@ -122,7 +124,7 @@ class SpaceDetour:
         """Return whether the way still leads to ``goal`` (3,), m; drop the places that lie behind."""
         if self._way is None or float(np.abs(self._way[-1] - goal).max()) > _MOVED_M:
             return False
-        seen = np.flatnonzero(self._free(least, rest, self._way))
+        seen = np.flatnonzero(self._free(least, rest, self._way[:_LOOKED]))
         if not len(seen):
             return False
         self._way = self._way[int(seen[-1]) :]

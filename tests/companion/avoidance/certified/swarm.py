@@ -233,7 +233,7 @@ class Vehicle:
             epoch = flight.commitment.epoch(now)
             beside = flight.agreements.kept()
             left = {system: last.plan for system, last in flight.agreements.left.items()}
-            found = flight.plan(now, standing(goal)._replace(given=True), self.world, _NOTHING)
+            found = flight.plan(now, standing(goal, None)._replace(given=True), self.world, _NOTHING)
             self.made.append(Made(self.system, since, epoch, beside, left, dict(self._begun), found))
 
     def _here(self, now: int, since: int) -> Array:
