@@ -74,9 +74,9 @@ class Room:
     def asked(self, rest: Array, subgoal: Array, *, stalled: bool) -> WireRoom | None:
         """Return the room that the vehicle asks for from ``rest`` to its ``subgoal`` (3,), m; None for none.
 
-        ``stalled``: it makes no progress. It asks until it is at its goal.
+        ``stalled``: it makes no progress. On the way to its goal it then asks until it is there.
         """
-        self._asks |= stalled and not self._there
+        self._asks |= stalled and not self._there and self._aside is None
         if self._aside is not None and self._rank == 0:
             return None
         if not self._asks and self._aside is None:
@@ -87,10 +87,7 @@ class Room:
     def _place(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array | None:
         """Return the place to stand at while ``goal`` (3,), m, is in a corridor; None if it is in none."""
         asking = self._asking(now, goal)
-        if not asking:
-            self._rank = 0
-            return None
-        ends = agreements.ends()
+        ends = agreements.ends() if asking else {}
         wide = [self._corridor(one, ends.get(system), goal, _WIDE) for system, one in asking]
         counted = [index for index, discs in enumerate(wide) if covered(goal[:2], discs.centres, discs.radii)]
         if not counted:

@@ -324,3 +324,13 @@ def test_it_does_not_ask_at_its_goal() -> None:
     near = ORIGIN + 0.15 * EAST
     standing.place(0, near)
     assert standing.asks(near, ORIGIN, stalled=True) is None
+
+
+def test_one_that_stands_aside_and_makes_no_progress_does_not_return_for_that() -> None:
+    """Its id is the lower one, so that it would not stand aside if it asked for room itself."""
+    standing = Standing(ORIGIN, own=5)
+    standing.place(0)
+    across(standing)
+    place = standing.place(0)
+    assert standing.asks(ORIGIN + 0.3 * (place - ORIGIN), place, stalled=True) is None
+    assert standing.place(0, ORIGIN + 0.3 * (place - ORIGIN)) is place
