@@ -9,6 +9,7 @@ only the cost of a plan.
 from __future__ import annotations
 
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +29,9 @@ from companion.ways import space_detour_of, way_of
 from companion.ways.subgoal import Subgoal
 from mavlink_bridge.messages import Source
 from mavlink_bridge.wire.plan import WirePlan
+
+if TYPE_CHECKING:
+    from companion.ways.space_detour import SpaceDetour
 
 _EFFORT = 2
 """How much of a search is done for a plan."""
@@ -53,15 +57,17 @@ class PlanGoals:
         sense: float,
     ) -> None:
         certified, limits = config.certified, config.limits
+        self._config = config
         self._agreements, self._sources, self._told = agreements, sources, told
         self._deadlock_turn = turn
         self._detour = Detour(limits.within(config.field.margin(1)), certified.deadlock.detour)
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
         least = from_surfaces(certified, config.field, limits) + BESIDE_M
         self._way = way_of(config, least, _EFFORT, BESIDE_M)
-        self._space = None
-        if self._way is None and not config.planar:
-            self._space = space_detour_of(config, least - BESIDE_M, sources.between, BESIDE_M)
+        # Its search is loaded when it is prepared, so that a companion starts without it.
+        self._space: SpaceDetour | None = None
+        self._has_space = self._way is None and not config.planar
+        self._least = least
         fastest = min(limits.v_max[:2]), min(limits.u_max[:2])
         self._anticipation = Anticipation(certified.anticipation, sources.between, *fastest, sense)
         self._fresh = certified.anticipation.fresh
@@ -84,7 +90,9 @@ class PlanGoals:
         """Work out what ways need at ``height`` (m), before the vehicle goes anywhere."""
         if self._way is not None:
             self._way.prepare(height)
-        if self._space is not None:
+        if self._has_space and self._space is None:
+            kept, between = self._least - BESIDE_M, self._sources.between
+            self._space = space_detour_of(self._config, kept, between, BESIDE_M)
             self._space.prepare()
 
     def chosen(

@@ -37,6 +37,7 @@ def test_a_way_through_gaps_that_open_and_close_is_no_progress() -> None:
     agreements: Any = SimpleNamespace(left={}, columns=(), resting=resting, ends=lambda: resting(0, 0.0))
     turn = DeadlockTurn(DeadlockConfig(), 1.0)
     goals = PlanGoals(config, Source(1, 1), agreements, sources, ToldGoals(Source(1, 1), 7), turn, 1.0)
+    goals.prepare(1.2)
     rest, goal = np.array([-2.7 * d, 0.0, 1.2]), np.array([2.7 * d, 0.0, 1.2])
     own, start = np.tile(rest, (STEPS, 3, 1)), at_rest(EPOCH, DT, STEPS, rest, 7)
     against = Pushes(np.array([[-50.0, 0.0, 0.0]]), np.zeros((1, 3)))
