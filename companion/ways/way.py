@@ -80,13 +80,15 @@ class Way:
         """Number of ways that were begun."""
         self.enclosed = False
         """Whether there is no way to the destination."""
+        self.closed = False
+        """Whether others that rest leave no way, as far as was searched."""
         self.clear = False
         """Whether no fixed obstacle is between the vehicle and the sub-goal that it was last given."""
 
     def forget(self) -> None:
         """Drop the way and the search of one, because the next destination is another one."""
         self._followed = self._search = self._ends = self._lower = self._goal = self._among = None
-        self._step, self.enclosed = _AT_REST, False
+        self._step, self.enclosed, self.closed = _AT_REST, False, False
 
     def keep_above(self, floor: float) -> None:
         """Search ways at the height ``floor`` (m) or above from now on; the present one is dropped."""
@@ -140,7 +142,7 @@ class Way:
             here, there = (np.array([x, y, self._level]) for x, y in (place[:2], goal[:2]))
         if self._straight(clear, here, there):
             self._followed = self._search = self._ends = self._among = None
-            self.enclosed, self.clear = False, True
+            self.enclosed, self.closed, self.clear = False, False, True
             return Subgoal(goal, 0.0)
         before = self._followed
         seen = self._follows(clear, here, there)
@@ -223,7 +225,9 @@ class Way:
         if found is None:
             if not alone:
                 self._among = self._ends = None
+                self.closed = True
             return
+        self.closed &= alone
         self.begun += 1
         self._lower = (found.level, goal) if found.level else None
         self._followed = Followed(found.corners, found.level)

@@ -67,6 +67,11 @@ class Detour:
             self._search(now, here, there, choices)
         return Subgoal(goal, 0.0) if self._way is None else self._along(self._way, rest, goal)
 
+    @property
+    def through(self) -> bool:
+        """Whether the way leads through what rests and may leave: past all of it there was none."""
+        return self._way is not None and self._choice > 0
+
     def forget(self) -> None:
         """Drop the way and the search of one."""
         self._way = self._looking = None

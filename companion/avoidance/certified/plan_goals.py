@@ -114,7 +114,7 @@ class PlanGoals:
         is asked for and made there.
         """
         anticipates = self._anticipates and not moving
-        rest, stalled = own[-1, 2], self._deadlock_turn.stalled
+        rest = own[-1, 2]
         room = self._room if given and not moving else None
         aim, asked = destination, None
         if room is not None:
@@ -124,7 +124,8 @@ class PlanGoals:
         subgoal = self._subgoal(now, epoch, rest, aim)
         goal = subgoal.place
         if room is not None:
-            asked = room.asked(rest, goal, stalled=stalled)
+            closed = self._detour.through or (self._way is not None and self._way.closed)
+            asked = room.asked(rest, goal, closed=closed)
         if not self._gives_way:
             tells = anticipates or asked is not None
             self._told.tell(destination if tells else None, room=asked)

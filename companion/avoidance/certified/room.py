@@ -1,11 +1,11 @@
 """Room that vehicles at their goals make for one that cannot get on.
 
-Vehicles at their goals close gaps for others. One that made no progress for a while asks for room: it tells
-its goal and the next place on its way (``told_goals.py``). A vehicle that has been at its goal stands aside
-while its goal is in the corridor from the end of the other's plan to that place, and returns afterwards.
-Where those that rest leave it no place beside the corridor, it asks for room, too, with a rank one higher. A
-vehicle stands aside for lower ranks than its own, and for a lower id of the same rank; so no two wait for
-each other. Only destinations change; planes keep all distances.
+Vehicles at their goals close gaps for others. One to which those that rest leave no way asks for room: it
+tells its goal and the next place on its way (``told_goals.py``). A vehicle that has been at its goal stands
+aside while its goal is in the corridor from the end of the other's plan to that place, and returns
+afterwards. Where those that rest leave it no place beside the corridor, it asks for room, too, with a rank
+one higher. A vehicle stands aside for lower ranks than its own, and for a lower id of the same rank; so no
+two wait for each other. Only destinations change; planes keep all distances.
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ class Room:
         self._reached = self._there = self._asks = False
         self._aside: Array | None = None
         self._rank = 0
+        self._closed_at: Array = np.zeros(3)
         self.moved = False
         """Whether ``destination`` is another place than when it was called before, for the same goal."""
 
@@ -71,17 +72,20 @@ class Room:
         self.moved = before is not self._aside
         return goal if self._aside is None else self._aside
 
-    def asked(self, rest: Array, subgoal: Array, *, stalled: bool) -> WireRoom | None:
+    def asked(self, rest: Array, subgoal: Array, *, closed: bool) -> WireRoom | None:
         """Return the room that the vehicle asks for from ``rest`` to its ``subgoal`` (3,), m; None for none.
 
-        ``stalled``: it makes no progress. On the way to its goal it then asks until it is there.
+        ``closed``: those that rest leave no way to its goal. It asks until they do and the end of its plan
+        has gone on by the length of a corridor, or is at the goal.
         """
-        self._asks |= stalled and not self._there and self._aside is None
+        if closed and not self._there and self._aside is None:
+            self._asks, self._closed_at = True, rest
+        longest = _LONG * self._sources.between
+        self._asks &= float(np.linalg.norm(rest - self._closed_at)) < longest
         if self._aside is not None and self._rank == 0:
             return None
         if not self._asks and self._aside is None:
             return None
-        longest = _LONG * self._sources.between
         return room_to(rest + limit(subgoal - rest, longest), self._rank)
 
     def _place(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array | None:

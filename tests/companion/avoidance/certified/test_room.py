@@ -107,9 +107,9 @@ class Standing:
         rest = self.here if rest is None else rest
         return self.room.destination(now, 0, rest, self.here, agreements)
 
-    def asks(self, rest: Array, onwards: Array, *, stalled: bool = False) -> WireRoom | None:
+    def asks(self, rest: Array, onwards: Array, *, closed: bool = False) -> WireRoom | None:
         """What it asks for on its way ``onwards`` (3,), m, from the end of its plan ``rest`` (3,), m."""
-        return self.room.asked(rest, onwards, stalled=stalled)
+        return self.room.asked(rest, onwards, closed=closed)
 
 
 ORIGIN, EAST = np.array([0.0, 0.0, 5.0]), np.array([1.0, 0.0, 0.0])
@@ -232,12 +232,12 @@ def test_in_space_a_corridor_far_above_concerns_nobody(planar: bool) -> None:
     assert (standing.place(0) is ORIGIN) == (not planar)
 
 
-def test_a_vehicle_asks_once_it_makes_no_progress_until_it_is_at_its_goal() -> None:
+def test_a_vehicle_asks_once_it_is_closed_in_until_it_has_gone_on_or_is_at_its_goal() -> None:
     standing = Standing(ORIGIN)
     rest = ORIGIN - 5.0 * EAST
     standing.place(0, rest)
     assert standing.asks(rest, ORIGIN) is None
-    asked = standing.asks(rest, ORIGIN, stalled=True)
+    asked = standing.asks(rest, ORIGIN, closed=True)
     assert asked is not None
     assert asked.rank == 0
     # The corridor is two least distances long.
@@ -256,7 +256,7 @@ def test_a_rank_ends_with_the_goal_for_which_room_was_made() -> None:
     standing.place(0)
     standing.here = ORIGIN + 20.0 * EAST
     assert standing.place(0, ORIGIN) is standing.here
-    asked = standing.asks(ORIGIN, standing.here, stalled=True)
+    asked = standing.asks(ORIGIN, standing.here, closed=True)
     assert asked is not None
     assert asked.rank == 0
 
@@ -277,7 +277,7 @@ def test_of_two_that_return_to_their_goals_head_on_one_stands_aside_and_neither_
         places = [one.place(now, rest) for one, rest in zip(two, rests, strict=True)]
         for k, (one, other) in enumerate(zip(two, two[::-1], strict=True)):
             moved[k] += one.room.moved
-            asked = one.asks(rests[k], places[k], stalled=now == 0)
+            asked = one.asks(rests[k], places[k], closed=now == 0)
             if asked is not None:
                 other.ask(now, ids[k], rests[k], asked.next_place_m, one.here, asked.rank)
     assert sum(place is not one.here for place, one in zip(places, two, strict=True)) == 1
@@ -323,7 +323,7 @@ def test_it_does_not_ask_at_its_goal() -> None:
     standing = Standing(ORIGIN)
     near = ORIGIN + 0.15 * EAST
     standing.place(0, near)
-    assert standing.asks(near, ORIGIN, stalled=True) is None
+    assert standing.asks(near, ORIGIN, closed=True) is None
 
 
 def test_one_that_stands_aside_and_makes_no_progress_does_not_return_for_that() -> None:
@@ -332,5 +332,16 @@ def test_one_that_stands_aside_and_makes_no_progress_does_not_return_for_that() 
     standing.place(0)
     across(standing)
     place = standing.place(0)
-    assert standing.asks(ORIGIN + 0.3 * (place - ORIGIN), place, stalled=True) is None
+    assert standing.asks(ORIGIN + 0.3 * (place - ORIGIN), place, closed=True) is None
     assert standing.place(0, ORIGIN + 0.3 * (place - ORIGIN)) is place
+
+
+def test_it_asks_no_more_once_it_has_gone_on_by_the_length_of_a_corridor() -> None:
+    standing = Standing(ORIGIN)
+    rest = ORIGIN - 9.0 * standing.d * EAST
+    standing.place(0, rest)
+    assert standing.asks(rest, ORIGIN, closed=True) is not None
+    for gone, asks in ((1.9, True), (2.1, False), (1.9, False)):
+        there = rest + gone * standing.d * EAST
+        standing.place(0, there)
+        assert (standing.asks(there, ORIGIN) is not None) == asks
