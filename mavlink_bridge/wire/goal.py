@@ -21,6 +21,7 @@ PAYLOAD_TYPE = 0xDC07
 
 _GOAL, _ASKING = 1, 2
 _PAYLOADS = {_GOAL: Struct("<BBB3i"), _ASKING: Struct("<BBB3iB3i")}
+_KINDS = {layout.size: kind for kind, layout in _PAYLOADS.items()}
 _MOST_MM = 2**31 - 1
 _Place = tuple[int, int, int]
 
@@ -28,8 +29,7 @@ _Place = tuple[int, int, int]
 class WireRoom(NamedTuple):
     """Room that a vehicle asks for, to go on to ``next_place`` (mm, fleet-local ENU).
 
-    ``rank``: 0 if it is on the way to its goal; one more than that of the
-    vehicle for which it makes room.
+    ``rank``: 0 if it is on the way to its goal; one more than that of the vehicle for which it makes room.
     """
 
     next_place: _Place
@@ -85,10 +85,9 @@ def pack(goal: WireGoal) -> bytes:
 
 def unpack(payload: bytes) -> WireGoal:
     """Return the goal in ``payload``; raises PlanWireError for another size or kind."""
-    kinds = {layout.size: kind for kind, layout in _PAYLOADS.items()}
-    kind = kinds.get(len(payload))
+    kind = _KINDS.get(len(payload))
     if kind is None:
-        raise PlanWireError(f"goal of {len(payload)} bytes, {' or '.join(map(str, kinds))} are needed")
+        raise PlanWireError(f"goal of {len(payload)} bytes, {' or '.join(map(str, _KINDS))} are needed")
     told, origin, reached, x, y, z, *room = _PAYLOADS[kind].unpack(payload)
     if told != kind or reached > 1:
         raise PlanWireError(f"goal of kind {told}, {reached}; {kind}, 0 or 1 are known")

@@ -11,6 +11,7 @@ two wait for each other. Only destinations change; planes keep all distances.
 from __future__ import annotations
 
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from companion.avoidance.certified.visibility_graph import Discs, free, without
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
 from companion.values.vectors import limit
-from mavlink_bridge.wire.goal import WireGoal, WireRoom, room_to
+from mavlink_bridge.wire.goal import WireRoom, room_to
 
 _REACHED_M = 0.2
 """Distance of the end of the plan from a goal that counts as reached, and by which a goal may move."""
@@ -35,6 +36,14 @@ _PART = 0.3
 """Distance of the discs that make a corridor, in least distances of plans."""
 _MOST_RANK = 7
 """Rank from which on nobody stands aside."""
+
+
+class _Asking(NamedTuple):
+    """Vehicle ``system`` (id), on the way to its ``goal`` (3,), m, and the ``room`` that it asks for."""
+
+    system: int
+    goal: Array
+    room: WireRoom
 
 
 class Room:
@@ -92,14 +101,14 @@ class Room:
         """Return the place to stand at while ``goal`` (3,), m, is in a corridor; None if it is in none."""
         asking = self._asking(now, goal)
         ends = agreements.ends() if asking else {}
-        wide = [self._corridor(one, ends.get(system), goal, _WIDE) for system, one in asking]
+        wide = [self._corridor(one, ends.get(one.system), goal, _WIDE) for one in asking]
         counted = [index for index, discs in enumerate(wide) if covered(goal[:2], discs.centres, discs.radii)]
         if not counted:
             self._rank = 0
             return None
         resting, fixed = self._sources.resting(epoch, rest, goal, agreements)
         if self._aside is not None:
-            kept = [self._corridor(one, ends.get(system), goal, _KEPT) for system, one in asking]
+            kept = [self._corridor(one, ends.get(one.system), goal, _KEPT) for one in asking]
             if not any(covered(self._aside[:2], discs.centres, discs.radii) for discs in kept):
                 return self._aside
         # The first have the lowest ranks: if there is no place for all, there is one for these.
@@ -108,16 +117,16 @@ class Room:
                 places = free_places(goal[:2], _together(discs, among), self._low, self._high)
                 seen = np.flatnonzero(free(rest[:2], places, without(rest[:2], discs)))
                 if len(seen):
-                    found, first = places[seen[0]], asking[counted[0]][1].room
-                    self._rank = first.rank + 1 if rank and first is not None else 0
+                    found, first = places[seen[0]], asking[counted[0]]
+                    self._rank = first.room.rank + 1 if rank else 0
                     place = np.array([found[0], found[1], goal[2]])
                     aside = self._aside
                     stays = aside is not None and float(np.abs(aside - place).max()) < _REACHED_M
                     return aside if stays else place
         return self._aside
 
-    def _asking(self, now: int, goal: Array) -> list[tuple[int, WireGoal]]:
-        """Return those that ask for room before this vehicle: system id and message, the lowest rank first.
+    def _asking(self, now: int, goal: Array) -> list[_Asking]:
+        """Return those that ask for room before this vehicle, the lowest rank first.
 
         Not those whose goal is so near to the own ``goal`` (3,), m, that both cannot be reached.
         """
@@ -128,27 +137,25 @@ class Room:
                 continue
             off = self._off(one.position_m - goal)
             if one.room.rank or float(off @ off) >= self._sources.between**2:
-                found.append(((one.room.rank, system), one))
-        return [(key[1], one) for key, one in sorted(found, key=lambda item: item[0])]
+                found.append(_Asking(system, one.position_m, one.room))
+        return sorted(found, key=lambda one: (one.room.rank, one.system))
 
-    def _corridor(self, asking: WireGoal, end: Array | None, goal: Array, wide: float) -> Discs:
+    def _corridor(self, asking: _Asking, end: Array | None, goal: Array, wide: float) -> Discs:
         """Return the discs at the height of ``goal`` (3,), m, of the corridor from ``end`` (3,) on.
 
         That of a vehicle on the way to its goal includes the place around it.
         """
         between = self._sources.between
-        room = asking.room
-        places = []
-        if room is not None:
-            first = room.next_place_m if end is None else end
-            # What others tell is not bounded.
-            last = first + limit(room.next_place_m - first, _LONG * between)
-            length = float(np.linalg.norm(last - first))
-            parts = max(1, int(length / (_PART * between)))
-            places = [first + share * (last - first) for share in np.linspace(0.0, 1.0, parts + 1)]
-            if room.rank == 0:
-                places.append(asking.position_m)
-        centres = np.array(places).reshape(-1, 3)
+        onwards = asking.room.next_place_m
+        first = onwards if end is None else end
+        # What others tell is not bounded.
+        last = first + limit(onwards - first, _LONG * between)
+        length = float(np.linalg.norm(last - first))
+        parts = max(1, int(length / (_PART * between)))
+        places = [first + share * (last - first) for share in np.linspace(0.0, 1.0, parts + 1)]
+        if asking.room.rank == 0:
+            places.append(asking.goal)
+        centres = np.array(places)
         above = np.zeros(len(centres)) if self._planar else (centres[:, 2] - goal[2]) / self._downwash
         square = (wide * between) ** 2 - above**2
         near = square > 0.0
