@@ -431,7 +431,7 @@ def accepted(bench: Bench, system: int, since: int) -> bool:
         certified,
         STEPS,
         known,
-        Geometry(lambda *_: True, lambda *_: True, lambda *_: np.zeros((1, AGREED))),
+        Geometry(lambda *_: True, lambda *_: np.zeros((STEPS + 1, AGREED))),
     )
     agreements.begin(since)
     agreements.made(plan_from(since, seed=2))

@@ -44,7 +44,7 @@ def made(own: StoredPlan, other: StoredPlan, rows: Rows) -> AgreedPlanes:
 
 
 def stacked(agreed: list[AgreedPlanes], epoch: int, dt: int, steps: int) -> Array:
-    """Return the rows (A, n + 1, 12) of all ``agreed`` from ``epoch`` (µs) on.
+    """Return the rows (A, n + 1, 13) of all ``agreed`` from ``epoch`` (µs) on.
 
     ``dt`` (µs) and ``steps`` n: of all plans. Raises CompanionError if ``epoch`` is no knot of ``agreed``, or
     before the beginning of one.

@@ -8,9 +8,7 @@ exactly.
 
 from __future__ import annotations
 
-import numpy as np
-
-from companion.avoidance.certified.separating_planes import agreed_planes, apart, keeps
+from companion.avoidance.certified.separating_planes import agreed_planes, apart
 from companion.values.horizon import Array
 
 _ROUNDING_M = 1e-6
@@ -21,16 +19,21 @@ class Distances:
     """Distances between plans, and the tests of two plans that depend on them.
 
     ``between``: least distance (m) between two plans in space; each column of the two adds ``further`` (m).
-    ``planar``: heights never count. ``steps``: number of knots of a plan. ``downwash``: height over width of
-    the ellipsoid in which distances in space are measured.
+    ``planar``: heights never count. ``downwash``: height over width of the ellipsoid in which distances in
+    space are measured. ``shift``: by how much planes move with both plans, see ``separating_planes``.
     """
 
     def __init__(
-        self, between: float, further: float, steps: int, *, planar: bool = False, downwash: float = 1.0
+        self,
+        between: float,
+        further: float,
+        *,
+        planar: bool = False,
+        downwash: float = 1.0,
+        shift: float = 0.0,
     ) -> None:
         self._between, self._further, self._planar = between, further, planar
-        self._downwash = downwash
-        self._rows = np.full((1, steps + 1), between)
+        self._downwash, self._shift = downwash, shift
 
     def least(self, columns: int) -> float:
         """Return the least distance (m) between two plans of which ``columns`` are columns."""
@@ -41,18 +44,14 @@ class Distances:
 
         Both are control points (k, 3, 3), m, on the same knots. ``columns``: number of columns among them.
         """
-        seen = levelled(other, own) if columns else other
-        return agreed_planes(own, seen, self.least(columns), upright=self._planar, downwash=self._downwash)
-
-    def keeps(self, newest: Array, own: Array, other: Array, columns: int) -> bool:
-        """Return whether ``newest`` keeps the own side of the planes of the plans ``own`` and ``other``.
-
-        All are control points (steps + 1, 3, 3), m, on the same knots. ``columns``: number of columns among
-        ``own`` and ``other``.
-        """
-        seen = levelled(other, own) if columns else other
-        rows = self._rows + columns * self._further
-        return keeps(newest, own, seen, rows, upright=self._planar, downwash=self._downwash)
+        return agreed_planes(
+            own,
+            levelled(other, own) if columns else other,
+            self.least(columns),
+            upright=self._planar or columns > 0,
+            downwash=self._downwash,
+            shift=self._shift,
+        )
 
     def apart(self, one: Array, other: Array, columns: int) -> bool:
         """Return whether two plans are the least distance apart at all times, horizontally near a column."""

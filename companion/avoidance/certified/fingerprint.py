@@ -22,7 +22,7 @@ from zlib import crc32
 from companion.config import CompanionConfig
 from mavlink_bridge.frames import FleetFrame
 
-_RULES = 2
+_RULES = 3
 """Version of the rules of agreements and planes."""
 _NANO, _MICRO = 1e9, 1e6
 """Units of angles (1e-9 °: 0.1 mm), and of lengths, speeds and k (1e-6 of the SI unit)."""
@@ -62,6 +62,7 @@ def fingerprint(config: CompanionConfig, frame: FleetFrame) -> int:
         config.planar,
         *(round(length * _MICRO) for length in lengths),
         certified.clock_us,
+        round(certified.plane_shift * _MICRO),
         _time_scale(config),
     ]
     if field.downwash != 1.0:

@@ -69,13 +69,19 @@ class CertifiedFlight:
         self._sources = ConstraintSources(config, steps)
         self._places = Places(config, own.system, self._sources)
         downwash, between = config.field.downwash, self._sources.between
-        distances = Distances(between, further(certified), steps, planar=config.planar, downwash=downwash)
+        distances = Distances(
+            between,
+            further(certified),
+            planar=config.planar,
+            downwash=downwash,
+            shift=certified.plane_shift,
+        )
         self.agreements = Agreements(
             own.system,
             certified,
             steps,
             identity(config, fleet),
-            Geometry(distances.keeps, distances.apart, distances.agreed),
+            Geometry(distances.apart, distances.agreed),
             None if self._vicinity is None else self._beyond,
         )
         self.reservation = Reservation(

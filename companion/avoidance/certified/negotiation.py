@@ -14,10 +14,11 @@ from collections.abc import Callable
 from math import inf
 from typing import NamedTuple
 
-from companion.avoidance.certified.agreed_planes import Rows, made
+from companion.avoidance.certified.agreed_planes import Rows, made, stacked
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan
+from companion.avoidance.certified.separating_planes import keeps
 from companion.values.horizon import Array
 from mavlink_bridge.wire.plan import WirePlan
 
@@ -36,12 +37,10 @@ _CLEAR = 256
 class Geometry(NamedTuple):
     """Tests of plans, which are control points (n + 1, 3, 3), m, on the same knots.
 
-    ``keeps``: whether the first plan keeps the own side of the planes of a pair of plans, the own and the
-    other. ``apart``: whether two plans are the least distance apart. ``agreed``: what the planes of a pair of
-    plans are made of. All take the number of columns among the pair of plans, see ``columns.Distances``.
+    ``apart``: whether two plans are the least distance apart. ``agreed``: what the planes of a pair of
+    plans are made of. Both take the number of columns among the pair of plans, see ``columns.Distances``.
     """
 
-    keeps: Callable[[Array, Array, Array, int], bool]
     apart: Callable[[Array, Array, int], bool]
     agreed: Rows
 
@@ -248,6 +247,5 @@ class Negotiation:
         ``plans``: first that of the vehicle of ``plan``. None of the plans begins later than ``epoch``, so
         all rest in the last of the n + 1 segments.
         """
-        rows = self._steps + 1
-        newest, own, other = (one.later(epoch, rows) for one in (plan, *plans))
-        return self._geometry.keeps(newest, own, other, plans.columns)
+        rows = stacked([made(*plans, self._geometry.agreed)], epoch, plan.plan.dt, self._steps)
+        return keeps(plan.later(epoch, self._steps + 1), rows[0])

@@ -6,14 +6,16 @@ plan of the pair minus those of the neighbour's (the same knots, so the same ind
 triangle nearest to the origin, c = x/‖x‖. Both sides compute the same plane with opposite normals, because
 floating point is symmetric under a change of sign. A new plan's control point i must satisfy
 
-    c·q_i ≥ c·(own_i + other_i)/2 + min(d, c·r_i)/2,
+    c·q_i ≥ c·own_i − λ max(c·r_i − d, 0),     λ = (1 − c·m)/2,     m = shift (u + u')/(‖u‖ + ‖u'‖ + 1 m),
 
-where own_i and other_i are the control points of the two plans of the pair, and d is the least distance. The
-neighbour's new plan must satisfy the same from the other side. So any two new plans are min(d, c·r_i) apart
-along c at every control point, hence everywhere on the segment (a Bézier curve lies in the hull of its
-control points). The own plan of the pair itself satisfies it, with room max(c·r_i − d, 0)/2. For an obstacle
-that shares no plan the own side keeps the whole distance, and the own plan of the pair is the committed one.
-``box_planes`` has the planes of boxes.
+where own_i are the control points of the own plan of the pair, d is the least distance, and u and u' are what
+the two plans travel from the beginning of the agreement to their ends. The neighbour's new plan must satisfy
+the same from the other side, where c is −c and λ is 1 − λ. So any two new plans are min(d, c·r_i) apart along
+c at every control point, hence everywhere on the segment (a Bézier curve lies in the hull of its control
+points). The own plan of the pair itself satisfies it, with the room λ max(c·r_i − d, 0), as 0 < λ < 1. Planes
+thus move with both vehicles: one that flies towards another which flies away has more of the room, and may
+replan into what the other one leaves. For an obstacle that shares no plan the own side keeps the whole
+distance, and the own plan of the pair is the committed one. ``box_planes`` has the planes of boxes.
 
 With ``downwash`` w > 1 the distance of two vehicles is ‖S Δ‖ with S = diag(1, 1, 1/w): the construction is
 that of the plans S p, and c·S q_i is (S c)·q_i, so S c is the normal of the rows. S is linear: hulls remain
@@ -34,8 +36,10 @@ from companion.values.compiled import BOOL, FLOAT, VOID, array, kernel, output, 
 from companion.values.horizon import Array
 
 _TINY = 1e-12
-AGREED = 12
+AGREED = 13
 """Length of a row of ``agreed_planes``."""
+_TRAVEL_M = 1.0
+"""Travel added to that of both plans: planes shift little between plans that hardly move."""
 
 
 class Others(NamedTuple):
@@ -45,7 +49,7 @@ class Others(NamedTuple):
     pair, on the committed plan's knots. ``distance`` (M, n), m: least distance on each segment. ``shares``
     (M,): whether the other side keeps half of it itself. ``heights`` (M,): 1/w, by which differences in
     height are multiplied; None: 1. ``boxes``: B boxes to keep ``from_boxes`` (m) from; None: none.
-    ``agreed`` (A, n + 1, 12), m: rows of ``agreed_planes`` from the beginning of the committed plan on, of
+    ``agreed`` (A, n + 1, 13), m: rows of ``agreed_planes`` from the beginning of the committed plan on, of
     pairs whose other side keeps half of the distance itself; None: none.
     """
 
@@ -94,29 +98,32 @@ def planes(committed: Array, others: Others, spare: float, *, upright: bool = Fa
 
 
 def agreed_planes(
-    own: Array, other: Array, distance: float, *, upright: bool = False, downwash: float = 1.0
+    own: Array,
+    other: Array,
+    distance: float,
+    *,
+    upright: bool = False,
+    downwash: float = 1.0,
+    shift: float = 0.0,
 ) -> Array:
-    """Return what the planes of a pair of plans are made of, a row (12,) for each segment, m.
+    """Return what the planes of a pair of plans are made of, a row (13,) for each segment, m.
 
-    ``own`` and ``other``: control points (k, 3, 3), m, on the same knots. A row has the normal S c; c·S own_i
-    for the three control points; c·S r_i − ``distance``; and where the other plan begins the segment.
+    ``own`` and ``other``: control points (k, 3, 3), m, on the same knots, from the beginning of the agreement
+    until both rest. ``shift``: 0…0.9, of the module's docstring. A row has the normal S c; c·S own_i for the
+    three control points; c·S r_i − ``distance``; where the other plan begins the segment; and λ.
     """
     found = np.empty((len(own), AGREED))
-    _agreed(np.ascontiguousarray(own), np.ascontiguousarray(other), distance, 1.0 / downwash, upright, found)
+    height = 1.0 / downwash
+    _agreed(np.ascontiguousarray(own), np.ascontiguousarray(other), distance, height, upright, shift, found)
     return found
 
 
-def keeps(
-    newest: Array, own: Array, other: Array, distance: Array, *, upright: bool = False, downwash: float = 1.0
-) -> bool:
-    """Return whether ``newest`` keeps the own side of the planes of the pair of plans ``own`` and ``other``.
+def keeps(newest: Array, rows: Array) -> bool:
+    """Return whether ``newest`` keeps the own side of the planes of an agreement.
 
-    All are control points (n, 3, 3), m, on the same knots; ``distance`` (1, n), m; ``downwash``: w.
+    ``newest``: control points (k, 3, 3), m; ``rows`` (k, 13): of ``agreed_planes``, on the same knots.
     """
-    heights = np.full(1, 1.0 / downwash)
-    pair = Others(own[None], other[None], distance, np.ones(1, dtype=np.bool_), heights)
-    found = planes(newest, pair, 0.0, upright=upright)
-    return kept(found, newest)
+    return _keeps(np.ascontiguousarray(newest), np.ascontiguousarray(rows))
 
 
 def apart(one: Array, two: Array, distance: float, *, upright: bool = False, downwash: float = 1.0) -> bool:
@@ -233,10 +240,26 @@ def _gaps(
     c[2] *= height
 
 
-@kernel(VOID, array(3), array(3), FLOAT, FLOAT, BOOL, output(2))
-def _agreed(own: Array, other: Array, distance: float, height: float, upright: bool, found: Array) -> None:
+@part
+def _travel(plan: Array, upright: bool, travel: Array) -> float:
+    """Write how far a plan goes to ``travel`` (3,), m, and return the length of it."""
+    for k in range(3):
+        travel[k] = plan[len(plan) - 1, 2, k] - plan[0, 0, k]
+    if upright:
+        travel[2] = 0.0
+    return sqrt(_dot(travel, travel))
+
+
+@kernel(VOID, array(3), array(3), FLOAT, FLOAT, BOOL, FLOAT, output(2))
+def _agreed(
+    own: Array, other: Array, distance: float, height: float, upright: bool, shift: float, found: Array
+) -> None:
     """Write the rows of ``agreed_planes``."""
-    relative, candidate = np.empty((3, 3)), np.empty(3)
+    relative, candidate, motion, others = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    # Both sides add the same two numbers first, so their results are the same bits.
+    travelled = _travel(own, upright, motion) + _travel(other, upright, others)
+    for k in range(3):
+        motion[k] = shift * (motion[k] + others[k]) / (travelled + _TRAVEL_M)
     for n in range(len(own)):
         row = found[n]
         c, gaps = row[:3], row[6:9]
@@ -245,15 +268,16 @@ def _agreed(own: Array, other: Array, distance: float, height: float, upright: b
             row[3 + i] = _dot(c, own[n, i])
             gaps[i] -= distance
             row[9 + i] = other[n, 0, i]
+        row[12] = 0.5 - 0.5 * _dot(c, motion)
 
 
 @part
 def _bounds(
-    normal: Array, here: float, gap: float, half: float, spare: float, point: Array
+    normal: Array, here: float, gap: float, share: float, spare: float, point: Array
 ) -> tuple[float, float]:
     """Return the least c·q of a control point, and the one that is wanted; ``point``: the committed one."""
-    least = here - half * max(gap, 0.0)
-    spared = here - half * max(gap - spare, 0.0)
+    least = here - share * max(gap, 0.0)
+    spared = here - share * max(gap - spare, 0.0)
     return least, max(least, min(spared, _dot(normal, point)))
 
 
@@ -290,7 +314,7 @@ def _planes(
                 c[i] = row[i]
             for i in range(3):
                 least[m, n, i], wanted[m, n, i] = _bounds(
-                    c, row[3 + i], row[6 + i], 0.5, spare, committed[n, i]
+                    c, row[3 + i], row[6 + i], row[12], spare, committed[n, i]
                 )
     relative, candidate, gaps = np.empty((3, 3)), np.empty(3), np.empty(3)
     for k in range(len(controls)):
@@ -310,4 +334,15 @@ def _kept(normals: Array, least: Array, points: Array) -> bool:
             for i in range(3):
                 if not _dot(normals[m, n], points[n, i]) >= least[m, n, i]:
                     return False
+    return True
+
+
+@kernel(BOOL, array(3), array(2))
+def _keeps(points: Array, rows: Array) -> bool:
+    for n in range(len(points)):
+        row = rows[n]
+        for i in range(3):
+            least, _ = _bounds(row[:3], row[3 + i], row[6 + i], row[12], 0.0, points[n, i])
+            if not _dot(row[:3], points[n, i]) >= least:
+                return False
     return True

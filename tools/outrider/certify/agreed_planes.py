@@ -2,7 +2,9 @@
 
 The planes are computed from the two plans of the agreement: for each segment, c points from the peer's plan
 to the own one along the shortest line between their hulls, and a control point q of a later own plan
-satisfies c·q ≥ c·own − max(c·(own − other) − d, 0)/2. After the last segment both plans and the plane rest.
+satisfies c·q ≥ c·own − λ max(c·(own − other) − d, 0). λ is (1 − c·m)/2, and m the sum of what both plans
+travel from the beginning of the agreement to their ends, divided by the sum of these lengths and 1 m, times
+``Terms.shift``. After the last segment both plans and the plane rest.
 
 Two plans that keep one agreement are as far apart as its own two plans, up to d. So the two plans of a later
 agreement must not be nearer than those of the one before, or than d.
@@ -26,6 +28,8 @@ from outrider.certify.lists import Listing
 
 SLACK = 1e-6
 """Tolerance for floating-point errors (m)."""
+_ADDED_M = 1.0
+"""Length added to what both plans travel."""
 
 
 class Kept(NamedTuple):
@@ -160,7 +164,23 @@ def _beyond(points: _Points, system: int, epoch: int, listed: Sequence[Listing],
     relative[(columns > 0) | terms.upright, ..., 2] = 0.0
     normals = nearest(relative.reshape(-1, 3, 3)).reshape(*relative.shape[:2], 1, 3)
     required = (terms.required + columns * terms.further)[:, None, None]
-    room = 0.5 * np.maximum((normals * relative).sum(axis=-1) - required, 0.0)
+    share = 0.5 - 0.5 * (normals * _motions(points, listed, terms)[:, None, None]).sum(axis=-1)
+    room = share * np.maximum((normals * relative).sum(axis=-1) - required, 0.0)
     short: Array = (normals * (own - plan)).sum(axis=-1) - room
     found: list[float] = short.max(axis=(1, 2)).tolist()
     return found
+
+
+def _motions(points: _Points, listed: Sequence[Listing], terms: Terms) -> Array:
+    """Return m (k, 3) of each agreement, in the measure of distances."""
+    found = np.empty((len(listed), 3))
+    for index, one in enumerate(listed):
+        begins = max(one.agreement)
+        sides = zip((one.owner, one.peer), one.agreement, strict=True)
+        flown = [points.later(system, plan, begins) for system, plan in sides]
+        travel = np.array([plan[-1, 2] - plan[0, 0] for plan in flown])
+        if terms.upright or points.columns(one):
+            travel[:, 2] = 0.0
+        found[index] = travel.sum(axis=0) / (np.linalg.norm(travel, axis=1).sum() + _ADDED_M)
+    result: Array = terms.shift * found / (1.0, 1.0, terms.downwash)
+    return result

@@ -37,7 +37,7 @@ class Terms(NamedTuple):
     and ``a_min`` the least, by default −a_max; ``upright``: whether only horizontal distances count;
     ``further``: what each column adds to the least distance (m); ``downwash``: number by which differences in
     height are divided; ``surface``: least distance (m) of a plan from the surface of a fixed obstacle;
-    ``reach``: the limited range, if there is one.
+    ``reach``: the limited range, if there is one; ``shift``: how far planes move with both plans, 0…0.9.
     """
 
     fleet: tuple[int, ...]
@@ -54,6 +54,7 @@ class Terms(NamedTuple):
     surface: float = 0.0
     reach: Reach | None = None
     a_min: Integers | None = None
+    shift: float = 0.0
 
 
 def milli(values: tuple[float, float, float]) -> Integers:

@@ -437,12 +437,19 @@ class Swarm:
             )
         )
         relative = own - other
-        columns = one.plans[kept.agreement.own].column + two.plans[kept.agreement.other].column
+        begins, travel = max(kept.agreement), np.zeros((2, 3))
+        plans = one.plans[kept.agreement.own], two.plans[kept.agreement.other]
+        for side, plan in enumerate(plans):
+            points = controls(carried_on(plan, (begins - plan.epoch) // plan.dt))
+            travel[side] = points[-1, 2] - points[0, 0]
+        columns = sum(plan.column for plan in plans)
         if columns:
-            relative[..., 2] = 0.0
+            relative[..., 2] = travel[:, 2] = 0.0
+        motion = travel.sum(axis=0) / (1.0 + np.linalg.norm(travel, axis=1).sum())
         normals = nearest(relative)
+        share = 0.5 * (1.0 - self.config.certified.plane_shift * normals @ motion)[:, None]
         gap = np.minimum(self.d + columns * self._further, np.einsum("nk,nik->ni", normals, relative))
-        least = np.einsum("nk,nik->ni", normals, own) - 0.5 * (
+        least = np.einsum("nk,nik->ni", normals, own) - share * (
             np.einsum("nk,nik->ni", normals, relative) - gap
         )
         return float((least - np.einsum("nk,nik->ni", normals, newest)).max())

@@ -43,7 +43,7 @@ def test_they_are_those_of_the_two_plans(
 ) -> None:
     """Bit by bit, also after both plans have ended; so are the velocities of the other plan."""
     own, other = pair(seed, columns, later)
-    distances = Distances(1.5, FURTHER, STEPS, planar=planar, downwash=downwash)
+    distances = Distances(1.5, FURTHER, planar=planar, downwash=downwash)
     begins = max(own.plan.epoch, other.plan.epoch) + epochs * LENGTH
     committed = controls(random_plan(np.random.default_rng(seed + 1), np.zeros(3)))
     one, two = own.later(begins, STEPS), other.later(begins, STEPS)
@@ -64,14 +64,14 @@ def test_they_are_those_of_the_two_plans(
 @pytest.mark.parametrize("off", [-LENGTH, LENGTH // 2])
 def test_there_are_none_before_the_agreement_or_between_knots(off: int) -> None:
     own, other = pair(1, (False, False), 2)
-    one = made(own, other, Distances(1.5, FURTHER, STEPS).agreed)
+    one = made(own, other, Distances(1.5, FURTHER).agreed)
     with pytest.raises(CompanionError, match="no planes for"):
         stacked([one], other.plan.epoch + off, DT, STEPS)
 
 
 def test_they_come_before_those_of_pairs_that_share_nothing() -> None:
     own, other = pair(1, (False, False), 0)
-    distances = Distances(1.5, FURTHER, STEPS)
+    distances = Distances(1.5, FURTHER)
     planes_of = made(own, other, distances.agreed)
     ball = np.broadcast_to(np.array([9.0, 0.0, 0.0]), (STEPS, 3, 3))
     begins = own.plan.epoch

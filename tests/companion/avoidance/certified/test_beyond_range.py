@@ -56,7 +56,7 @@ class Here:
             self.config.certified,
             STEPS,
             FleetIdentity(FRAME, FRAME & 0xFF),
-            Geometry(DISTANCES.keeps, DISTANCES.apart, DISTANCES.agreed),
+            Geometry(DISTANCES.apart, DISTANCES.agreed),
             self._beyond,
         )
         self.agreements.begin(EPOCH)

@@ -10,6 +10,7 @@ from companion.avoidance.certified.noncooperative import NonCooperative, NonCoop
 from companion.avoidance.certified.separating_planes import (
     Others,
     Planes,
+    agreed_planes,
     apart,
     hull_distance,
     keeps,
@@ -53,8 +54,19 @@ def test_two_plans_that_keep_their_sides_are_apart_in_the_ellipsoid(seed: int, d
     d = float(rng.choice([0.3, 0.9, 2.5]))
     off = rng.normal(size=3) * 10.0 ** rng.uniform(-1, 0.7)
     points = [later(random_plan(rng, np.zeros(3))), later(random_plan(rng, off))]
+    shift, none = float(rng.choice([0.0, 0.75])), np.empty((0, STEPS, 3, 3))
     sides = [
-        planes(own, others(own, other, d, downwash), SPARE)
+        planes(
+            own,
+            Others(
+                none,
+                none,
+                np.empty((0, STEPS)),
+                np.zeros(0, dtype=np.bool_),
+                agreed=agreed_planes(own, other, d, downwash=downwash, shift=shift)[None],
+            ),
+            SPARE,
+        )
         for own, other in zip(points, points[::-1], strict=True)
     ]
     assert np.array_equal(sides[0].normals, -sides[1].normals)
@@ -84,10 +96,10 @@ def test_one_above_another_must_be_further_away() -> None:
         assert apart(above, below, 1.0, downwash=2.0) is far
         assert apart(above, below, 1.0)
         # Half of the distance that is left may be given up, each: in height, the downwash times as much.
-        distance = np.full((1, STEPS), 1.0)
+        rows = agreed_planes(above, below, 1.0, downwash=2.0)
         lower = above - np.array((0.0, 0.0, 0.04))
-        assert keeps(lower, above, below, distance, downwash=2.0) is far
-    assert not keeps(above - np.array((0.0, 0.0, 0.06)), above, below, distance, downwash=2.0)
+        assert keeps(lower, rows) is far
+    assert not keeps(above - np.array((0.0, 0.0, 0.06)), rows)
 
 
 def test_the_field_of_a_non_cooperative_vehicle_above_reaches_as_far_as_its_ellipsoid() -> None:

@@ -50,6 +50,7 @@ COMMON: dict[str, dict[str, Any]] = {
     "speed of climb": {"limits": {"v_max": [5.0, 5.0, 4.001]}},
     "speed of descent": {"limits": {"v_min": [-5.0, -5.0, -4.5]}},
     "clocks": {"certified": {"clock_us": 5_001}},
+    "planes": {"certified": {"plane_shift": 0.74}},
     "own clock": {"certified": {"fleet_time": "own"}},
     "reference": {"certified": {"time_sources": {"reference": 2}}},
     "another reference": {"certified": {"time_sources": {"reference": 3}}},

@@ -58,7 +58,7 @@ def test_a_vehicle_whose_goal_is_covered_rests_at_the_nearest_free_place() -> No
     def of(_since: int, system: int) -> Array:
         return goals[system]
 
-    swarm.run(8_000_000, of)
+    swarm.run(10_000_000, of)
     ends = [swarm.vehicles[1].plan(epoch).position_m for epoch in swarm.epochs()[-10:]]
     apart = float(np.linalg.norm(goal[:2] - starts[0, :2]))
     for end in ends:

@@ -153,7 +153,7 @@ def limited(far: float = 10.0) -> Agreements:
         return float(np.linalg.norm(one.controls[0, 0] - (0.0, 0.0, 5.0))) >= far
 
     of = CertifiedConfig(epoch_us=LENGTH, dt_us=DT, fleet=(OWN, OTHER, THIRD), range=50.0)
-    geometry = Geometry(DISTANCES.keeps, DISTANCES.apart, DISTANCES.agreed)
+    geometry = Geometry(DISTANCES.apart, DISTANCES.agreed)
     one = Agreements(OWN, of, STEPS, FleetIdentity(FRAME, FRAME & 0xFF), geometry, beyond)
     one.begin(EPOCH)
     one.made(plan())

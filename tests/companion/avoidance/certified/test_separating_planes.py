@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from companion.avoidance.certified.separating_planes import (
     Others,
     Planes,
+    agreed_planes,
     hull_distance,
     keeps,
     kept,
@@ -130,22 +131,33 @@ def test_where_nothing_separates_there_is_a_unit_vector_all_the_same(spot: float
         assert np.linalg.norm(nearest(t[None])[0]) == pytest.approx(1.0)
 
 
-class Pair:
-    """Two committed plans, and each one's planes about the other."""
+NOTHING = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, dtype=np.bool_))
 
-    def __init__(self, seed: int, shares: tuple[bool, bool] = (True, True), *, upright: bool = False) -> None:
+
+class Pair:
+    """Two committed plans, and each one's planes about the other, which move with both of them.
+
+    ``agreed``: both sides keep the distance; otherwise each keeps all of it.
+    """
+
+    def __init__(self, seed: int, *, agreed: bool = True, upright: bool = False) -> None:
         rng = self.rng = np.random.default_rng(seed)
         self.d = float(rng.choice([0.3, 0.9, 2.5]))
         apart = rng.normal(size=3) * 10.0 ** rng.uniform(-1, 0.7)
         self.points = [later(random_plan(rng, np.zeros(3))), later(random_plan(rng, apart))]
+        self.upright, self.shift = upright, float(rng.choice([0.0, 0.75, 0.9]))
+        sides = list(zip(self.points, self.points[::-1], strict=True))
+        self.rows = [self._agreed(own, other) for own, other in sides]
         self.planes = [
             planes(
                 own,
-                Others(own[None], other[None], np.full((1, STEPS), self.d), np.array([share])),
+                NOTHING._replace(agreed=rows[None])
+                if agreed
+                else Others(own[None], other[None], np.full((1, STEPS), self.d), np.zeros(1, np.bool_)),
                 SPARE,
                 upright=upright,
             )
-            for own, other, share in zip(self.points, self.points[::-1], shares, strict=True)
+            for (own, other), rows in zip(sides, self.rows, strict=True)
         ]
         relative = self.points[0] - self.points[1]
         relative[..., 2] *= not upright
@@ -153,6 +165,9 @@ class Pair:
         self.apart_now = hull_distance(relative) > 0.0
         self.least = np.where(self.apart_now[:, None], np.minimum(gap, self.d), -np.inf)
         """How far apart control points have to be along the normal (n, 3), where anything separates them."""
+
+    def _agreed(self, own: Array, other: Array) -> Array:
+        return agreed_planes(own, other, self.d, upright=self.upright, shift=self.shift)
 
     def drawn(self, side: int) -> Array:
         """Control points (n, 3, 3) anywhere on the own side of every plane."""
@@ -202,7 +217,7 @@ def test_a_new_plan_and_one_that_is_carried_on_are_apart(seed: int) -> None:
 
 @given(seeds)
 def test_from_what_shares_nothing_the_own_side_keeps_it_all(seed: int) -> None:
-    pair = Pair(seed, shares=(False, False))
+    pair = Pair(seed, agreed=False)
     pair.check(pair.drawn(0), pair.points[1])
 
 
@@ -210,18 +225,34 @@ def test_from_what_shares_nothing_the_own_side_keeps_it_all(seed: int) -> None:
 def test_a_plan_keeps_an_agreement_if_it_is_on_its_side_of_every_plane(seed: int, upright: bool) -> None:
     """The two plans of the agreement do, to the last bit, and any other that is drawn there."""
     pair = Pair(seed, upright=upright)
-    distance = np.full((1, STEPS), pair.d)
     for side in (0, 1):
-        own, other, p = pair.points[side], pair.points[1 - side], pair.planes[side]
-        assert keeps(own, own, other, distance, upright=upright)
+        rows, p = pair.rows[side], pair.planes[side]
+        assert keeps(pair.points[side], rows)
         inside = pair.drawn(side) + 1e-9 * p.normals[0][:, None]
-        assert keeps(inside, own, other, distance, upright=upright)
+        assert keeps(inside, rows)
         crossing = inside.copy()
         segment, point = pair.rng.integers(0, STEPS), pair.rng.integers(0, 3)
         normal = p.normals[0, segment]
         beyond = normal @ inside[segment, point] - p.least[0, segment, point] + 1e-6
         crossing[segment, point] -= beyond * normal
-        assert not keeps(crossing, own, other, distance, upright=upright)
+        assert not keeps(crossing, rows)
+
+
+@given(seeds, st.booleans())
+def test_planes_move_with_both_plans(seed: int, upright: bool) -> None:
+    """Their shares of the room make one; of two that fly in a row the one behind has more."""
+    pair = Pair(seed, upright=upright)
+    mine, others = (rows[:, 12] for rows in pair.rows)
+    np.testing.assert_allclose(mine + others, 1.0, rtol=0.0, atol=1e-15)
+    assert ((mine >= 0.05) & (mine <= 0.95)).all()
+    away, aside = np.array([50.0, 0.0, 0.0]), np.array([0.0, 50.0, 0.0])
+    travel = np.linspace(0.0, 1.0, 3 * STEPS).reshape(STEPS, 3, 1)
+    for way, share in ((away, 0.5 - 0.5 * pair.shift), (-away, 0.5 + 0.5 * pair.shift), (aside, 0.5)):
+        flown = travel * way
+        found = agreed_planes(
+            flown + np.array([100.0, 0.0, 0.0]), flown, 1.0, upright=upright, shift=pair.shift
+        )
+        np.testing.assert_allclose(found[:, 12], share, rtol=0.0, atol=0.01)
 
 
 @given(seeds)
@@ -232,10 +263,8 @@ def test_the_planes_of_an_agreement_do_not_depend_on_the_plan_that_is_replaced(s
     before = pair.planes
     old = Pair(seed)
     pair.planes = [
-        planes(
-            newest, Others(own[None], other[None], np.full((1, STEPS), pair.d), np.ones(1, np.bool_)), SPARE
-        )
-        for newest, own, other in zip(pair.points, old.points, old.points[::-1], strict=True)
+        planes(newest, NOTHING._replace(agreed=rows[None]), SPARE)
+        for newest, rows in zip(pair.points, old.rows, strict=True)
     ]
     for now, then in zip(pair.planes, before, strict=True):
         np.testing.assert_array_equal(now.normals, then.normals)

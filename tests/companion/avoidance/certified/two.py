@@ -17,7 +17,7 @@ OWN, OTHER, THIRD = 1, 2, 3
 FRAME = 0xABCDEF07
 LENGTH = 200_000
 NOW = EPOCH + 30_000
-DISTANCES = Distances(1.0, 0.25, STEPS)
+DISTANCES = Distances(1.0, 0.25)
 
 
 def agreements(own: int = OWN, *expected: int) -> Agreements:
@@ -27,7 +27,7 @@ def agreements(own: int = OWN, *expected: int) -> Agreements:
         config,
         STEPS,
         FleetIdentity(FRAME, FRAME & 0xFF),
-        Geometry(DISTANCES.keeps, DISTANCES.apart, DISTANCES.agreed),
+        Geometry(DISTANCES.apart, DISTANCES.agreed),
     )
     one.begin(EPOCH)
     return one
