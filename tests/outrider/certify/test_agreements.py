@@ -15,6 +15,7 @@ from outrider.certify.histories import Kind
 from outrider.certify.verdict import Verdict, judge
 from tests.outrider.certify.evidence import (
     BEGAN,
+    DT,
     EPOCH,
     TERMS,
     Told,
@@ -117,6 +118,30 @@ def test_a_plan_beyond_the_planes_is_found(metres: float, beyond: bool) -> None:
     least = verdict.pairs.nearest
     assert least is not None
     assert least.distance > 2.0
+
+
+def pulses(metres: float, knots: int) -> list[int]:
+    """Accelerations (mm/s²) that move a vehicle by ``metres`` in so many knots, and in as many to rest."""
+    most = round(1e3 * metres / (1e-6 * DT * knots) ** 2)
+    return [most] * knots + [-most] * knots
+
+
+@pytest.mark.parametrize(("metres", "beyond"), [(1.34, False), (1.36, True)])
+@pytest.mark.parametrize("behind", [False, True])
+def test_planes_move_with_both_plans(metres: float, beyond: bool, behind: bool) -> None:
+    """Both fly 1 m to the east: the one behind has 3/4 of the 1.8 m between them, and the other 1/4."""
+    base = [*pulses(1.0, 5), 0, 0, 0, 0, 0]
+    plans = {system: turned(at, [(a, 0, 0) for a in base]) for system, at in ((11, A), (12, B))}
+    mover, by = (11, metres) if behind else (12, -metres / 3.0)
+    changed = [(a + more, 0, 0) for a, more in zip(base[1:], pulses(by, 7), strict=True)]
+    after = {system: on(plan) for system, plan in plans.items()}
+    after[mover] = turned(after[mover], changed)
+    sent = {system: [plan, after[system]] for system, plan in plans.items()}
+    terms = TERMS._replace(a_max=(4000, 4000, 4000))
+    crossing = [("a plan beyond agreed planes", (mover, 23 - mover))]
+    assert found(judge(evidence(sent, terms._replace(shift=0.75)))) == (crossing if beyond else [])
+    # With planes that do not move each has a half.
+    assert found(judge(evidence(sent, terms))) == (crossing if behind else [])
 
 
 @pytest.mark.parametrize("stale", [False, True])
