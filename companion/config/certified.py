@@ -127,8 +127,8 @@ class CertifiedConfig(Settings):
         }
     )
 
-    dt_us: WireStep = Field(200_000, description="knots of the plans, µs: absolute, k·dt")
-    epoch_us: int = Field(200_000, gt=0, le=2_000_000, multiple_of=4, description="µs; a whole number of dt")
+    dt_us: WireStep = Field(220_000, description="knots of the plans, µs: absolute, k·dt")
+    epoch_us: int = Field(220_000, gt=0, le=2_000_000, multiple_of=4, description="µs; a whole number of dt")
     last_call_us: int = Field(
         20_000,
         ge=0,

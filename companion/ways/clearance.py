@@ -74,7 +74,7 @@ class Clearance:
         blocks = np.where(outside, -1, self._block(points))
         for block in np.unique(blocks).tolist():
             near = self._all if block < 0 else self._near[block]
-            if near is not None:
+            if near is not None and len(near):
                 here = blocks == block
                 found[here] = self._least(near, points[here])
         return found if self._balls is None else np.minimum(found, self._balls.distance(points))

@@ -45,7 +45,9 @@ from mavlink_bridge.wire.signing import Signing
 
 SYSTEM = 11
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
-CONFIG = CompanionConfig.model_validate({"task": "goto", "avoidance": "certified"})
+CONFIG = CompanionConfig.model_validate(
+    {"task": "goto", "avoidance": "certified", "certified": {"dt_us": 200_000, "epoch_us": 200_000}}
+)
 DT, STEPS, TICK = 200_000, 16, 10_000
 BEGIN = 1_767_225_600_000_000
 AUTOPILOT, COMPANION = Source(SYSTEM, 1), Source(SYSTEM, COMPONENT)

@@ -39,6 +39,9 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     return fly(OF, 5, tmp_path_factory.mktemp("first"))
 
 
+EPOCH = {"dt_us": 200_000, "epoch_us": 200_000}
+
+
 def heard(flown: Flown, k: int, other: int) -> list[int]:
     """Times (µs) at which vehicle ``k`` received something of vehicle ``other``."""
     system = flown.flight.systems[other]
@@ -104,7 +107,7 @@ def test_radios_must_reach_so_far_that_who_leaves_is_heard_beyond_the_range(
 
     Heights differ by two margins more than those of plans.
     """
-    settings = {"range": 15.0, "tube": 0.5, "drift": 0.5, "clock_us": 0, "sigmas": 0.0, "epoch_us": 200_000}
+    settings = {"range": 15.0, "tube": 0.5, "drift": 0.5, "clock_us": 0, "sigmas": 0.0, **EPOCH}
     leaves = 15.0 + 2.0 * 0.5 + 2.0 * 0.2 * np.sqrt(1.5**2 + 1.5**2 + 0.5**2)
     least = np.hypot(leaves, heights + 2.0 * 0.5)
 
@@ -123,7 +126,7 @@ def test_radios_must_reach_so_far_that_who_leaves_is_heard_beyond_the_range(
 
 def test_radios_must_reach_a_vehicle_on_the_ground_within_the_range() -> None:
     """Of those that fly in one plane no plan is above another, but they land."""
-    settings = {"range": 15.0, "tube": 0.05, "drift": 0.05, "clock_us": 0, "sigmas": 0.0, "epoch_us": 200_000}
+    settings = {"range": 15.0, "tube": 0.05, "drift": 0.05, "clock_us": 0, "sigmas": 0.0, **EPOCH}
     high = certified(16.5, planar=True, **settings)
     prepared(high.model_copy(update={"starts": high.starts.model_copy(update={"height": 4.0})}), "a file")
     high = high.model_copy(update={"starts": high.starts.model_copy(update={"height": 9.0})})
@@ -133,7 +136,7 @@ def test_radios_must_reach_a_vehicle_on_the_ground_within_the_range() -> None:
 
 def test_true_heights_differ_by_two_margins_more_than_those_of_plans() -> None:
     """With `gnss` a margin is 2.062 m, as k · σ counts in each direction."""
-    of = certified(45.6, planar=True, range=40.0).model_copy(update={"sensors": "gnss"})
+    of = certified(45.6, planar=True, range=40.0, **EPOCH).model_copy(update={"sensors": "gnss"})
     with pytest.raises(InputError, match=r"more than 45\.683 m"):
         prepared(of, "a file")
 

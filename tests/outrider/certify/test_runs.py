@@ -20,6 +20,7 @@ from companion.avoidance.certified.agreed_planes import AgreedPlanes, made
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.pair import Agreement, Pair
 from companion.avoidance.certified.reservation import Reservation
+from companion.config.certified import CertifiedConfig
 from companion.values.components import COMPONENT
 from mavlink_bridge.messages import CommandLong, Message, Source, Tunnel
 from mavlink_bridge.tlog.log import Record, TlogWriter, read_tlog
@@ -36,6 +37,9 @@ from outrider.scenarios.options import Options, apply
 from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
 from tests.outrider.shipped import FIREFLY, scenario
+
+LENGTH = CertifiedConfig().epoch_us
+"""Length of an epoch, µs."""
 
 
 class Ended(NamedTuple):
@@ -406,7 +410,7 @@ def test_a_second_take_off_is_judged_also_without_a_landing_between(run: Path) -
     )
     own = Source(11, COMPONENT)
     climb = CommandLong(own, 11, 1, mavlink.MAV_CMD_NAV_TAKEOFF, 0, (0.0,) * 7)
-    anew = said._replace(epoch=said.epoch + 200_000, since=said.epoch + 200_000, entries=())
+    anew = said._replace(epoch=said.epoch + LENGTH, since=said.epoch + LENGTH, entries=())
     landed = Tunnel(own, 0, 0, AGREEMENTS, pack(anew))
     codec = Codec()
     with TlogWriter(log) as writer:

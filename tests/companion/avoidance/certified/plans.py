@@ -10,7 +10,7 @@ from companion.values.horizon import Array
 from mavlink_bridge.wire.plan import Integers, WirePlan, quantise
 
 DT = 200_000
-"""µs."""
+"""µs, not the default: a round number of the units of the wire."""
 STEPS = 16
 EPOCH = 1_767_225_600_000_000
 """µs, a whole number of knots and of every length of an epoch here."""

@@ -16,7 +16,7 @@ from companion.values.horizon import Array, roll_out
 from mavlink_bridge.wire.plan import WirePlan
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS, later, random_plan
 
-CONFIG = CertifiedConfig(dt_us=DT)
+CONFIG = CertifiedConfig(dt_us=DT, epoch_us=DT)
 WIDE = LimitsConfig()
 NARROW = LimitsConfig(
     u_max=(0.6, 1.2, 0.4), v_max=(0.8, 1.5, 0.5), box_min=(-0.5, -1.0, 4.0), box_max=(0.5, 1.0, 5.5)

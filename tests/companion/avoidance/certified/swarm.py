@@ -277,7 +277,7 @@ class Swarm:
         habits: Sequence[Habits],
         seed: int,
         *,
-        epoch: int = 200_000,
+        epoch: int = DT,
         strangers: bool = False,
         others: Mapping[int, Mapping[str, object]] | None = None,
         planar: bool = False,
@@ -290,7 +290,7 @@ class Swarm:
         ``more``: other values of the companions' settings.
         """
         fleet = tuple(range(1, len(starts) + 1))
-        expected: dict[str, object] = {"epoch_us": epoch, "fleet": () if strangers else fleet}
+        expected: dict[str, object] = {"dt_us": DT, "epoch_us": epoch, "fleet": () if strangers else fleet}
         certified = CertifiedConfig.model_validate({**expected, **(settings or {})})
         limits = LimitsConfig() if v_max is None else LimitsConfig(v_max=v_max)
         document: dict[str, object] = {"task": "goto", "avoidance": "certified", "turning_sense": "right"}

@@ -20,6 +20,7 @@ from companion.avoidance.certified.negotiation import Negotiation
 from companion.avoidance.certified.reservation import Reservation
 from companion.avoidance.certified.separating_planes import agreed_planes
 from companion.config import CompanionConfig
+from companion.config.certified import CertifiedConfig
 from companion.values.components import COMPONENT
 from companion.values.horizon import Array, Motion
 from mavlink_bridge.errors import PlanWireError
@@ -31,6 +32,7 @@ from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
 from tests.companion.avoidance.certified.swarm import CLIMB, FLEET, NEVER, Habits, Rough, Swarm, Vehicle
 from tests.companion.avoidance.certified.two import LENGTH, NOW, OTHER, OWN, agreed, agreements, leaving, plan
 
+CONFIG = CompanionConfig(avoidance="certified", certified=CertifiedConfig(dt_us=DT, epoch_us=DT))
 UNTIL = 6_000_000
 """µs of a run."""
 UP = np.array([0.0, 0.0, 1.0])
@@ -197,7 +199,7 @@ def test_a_column_waits_for_all_agreements_if_it_was_never_reserved_or_another_m
 ) -> None:
     """Another controller took the vehicle off, so that planes may be kept that are not upright; or the plan
     of one that begins anew, at ``x`` (m), is too near."""
-    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    flight = CertifiedFlight(CONFIG, Source(OWN, COMPONENT), FLEET)
     stands = Motion(np.zeros(3), np.zeros(3), np.zeros(3))
     for now in range(EPOCH, EPOCH + 4 * LENGTH, LENGTH):
         if reserved:
@@ -212,7 +214,7 @@ def test_a_column_waits_for_all_agreements_if_it_was_never_reserved_or_another_m
 
 def test_a_column_that_is_begun_elsewhere_has_not_been_reserved() -> None:
     """It was moved on the ground: what the others keep is the column before."""
-    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    flight = CertifiedFlight(CONFIG, Source(OWN, COMPONENT), FLEET)
     for number, x in enumerate((0.0, 0.0, 0.0, 0.0, 3.0)):
         stands = Motion(np.array([x, 0.0, 0.0]), np.zeros(3), np.zeros(3))
         flight.park(EPOCH + number * LENGTH, stands, joins=True)
@@ -221,7 +223,7 @@ def test_a_column_that_is_begun_elsewhere_has_not_been_reserved() -> None:
 
 def test_no_reservation_survives_a_landing() -> None:
     """Its agreements ended with the farewell, though the column is the same; the next is waited for anew."""
-    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    flight = CertifiedFlight(CONFIG, Source(OWN, COMPONENT), FLEET)
     stands, reserved = Motion(np.zeros(3), np.zeros(3), np.zeros(3)), []
     for number, joins in enumerate((True, True, True, True, False, False, True, True, True, True)):
         now = EPOCH + number * LENGTH
@@ -293,7 +295,7 @@ def test_the_wait_for_a_reservation_asks_once_who_has_agreed(monkeypatch: pytest
 def test_how_far_a_vehicle_is_from_its_plan_is_judged_by_the_plan_of_the_epoch(column: bool) -> None:
     """Also at the epoch's first step, before ``due`` turns to its plan: a column counts horizontally."""
     here = np.array([0.0, 0.0, 5.0])
-    flight = CertifiedFlight(CompanionConfig(avoidance="certified"), Source(OWN, COMPONENT), FLEET)
+    flight = CertifiedFlight(CONFIG, Source(OWN, COMPONENT), FLEET)
     flight.stand(EPOCH, here)
     now = EPOCH
     while flight.commitment.following is None or not flight.commitment.following.column:
@@ -313,7 +315,7 @@ class Above:
     """1 hovers, and 2 above it or beside it at ``place`` (3,), m; what they send arrives unless ``lost``."""
 
     def __init__(self, place: Array) -> None:
-        config = CompanionConfig(avoidance="certified")
+        config = CONFIG
         self.places = {OWN: np.array([0.0, 0.0, 5.0]), OTHER: place}
         self.flights = {s: CertifiedFlight(config, Source(s, COMPONENT), FLEET) for s in self.places}
         self.now, self.lost = EPOCH, False

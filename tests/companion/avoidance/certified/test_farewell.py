@@ -34,7 +34,10 @@ from tests.companion.bench import Bench, only
 
 LEFT, OWN, STRANGER = 1, 2, 77
 CONFIG = CompanionConfig(
-    task="goto", avoidance="certified", turning_sense="right", certified=CertifiedConfig(fleet=(LEFT, OWN))
+    task="goto",
+    avoidance="certified",
+    turning_sense="right",
+    certified=CertifiedConfig(dt_us=DT, epoch_us=DT, fleet=(LEFT, OWN)),
 )
 LEAST = between(CONFIG.certified, CONFIG.field, CONFIG.limits)
 SAME = beside(CONFIG.certified, CONFIG.field, CONFIG.limits)

@@ -36,9 +36,9 @@ def printed(change: dict[str, Any] | None = None, frame: FleetFrame = FLEET) -> 
 
 
 COMMON: dict[str, dict[str, Any]] = {
-    "knots": {"certified": {"dt_us": 100_000}},
+    "knots": {"certified": {"dt_us": 110_000}},
     "segments": {"horizon": {"steps": 14}},
-    "epochs": {"certified": {"epoch_us": 400_000}},
+    "epochs": {"certified": {"epoch_us": 440_000}},
     "heights": {"planar": True},
     "d_min": {"field": {"d_min": 0.5001}},
     "downwash": {"field": {"downwash": 2.0}},

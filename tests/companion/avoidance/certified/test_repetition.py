@@ -33,6 +33,7 @@ from tests.companion.avoidance.certified.two import (
 )
 
 USUAL, SHORT = 50_000, 20_000
+CONFIG = CertifiedConfig(dt_us=LENGTH, epoch_us=LENGTH)
 
 
 def share(loss: float, period: int = USUAL) -> float:
@@ -51,14 +52,14 @@ def periods(repetition: Repetition, shares: list[float | None], begin: int = 0) 
 
 @given(st.lists(st.floats(0.0, 0.8).map(share) | st.none(), max_size=60))
 def test_below_four_of_five_lost_the_period_is_the_usual_one(shares: list[float | None]) -> None:
-    assert set(periods(Repetition(CertifiedConfig()), shares)) <= {USUAL}
+    assert set(periods(Repetition(CONFIG), shares)) <= {USUAL}
 
 
 @given(st.lists(st.floats(0.0, 1.0) | st.none(), max_size=200), st.floats(1.0, 5.0))
 def test_the_period_is_the_usual_one_or_shorter_by_the_factor(
     shares: list[float | None], factor: float
 ) -> None:
-    found = periods(Repetition(CertifiedConfig(repeat_in_loss=factor)), shares)
+    found = periods(Repetition(CONFIG.model_copy(update={"repeat_in_loss": factor})), shares)
     assert set(found) <= {USUAL, round(USUAL / factor)}
 
 
@@ -73,7 +74,7 @@ def test_the_period_is_the_usual_one_or_shorter_by_the_factor(
     ],
 )
 def test_the_period_is_shorter_while_most_is_lost(then: float | None, expected: int) -> None:
-    found = periods(Repetition(CertifiedConfig()), [share(0.9), *[then] * 200])
+    found = periods(Repetition(CONFIG), [share(0.9), *[then] * 200])
     assert found[0] == SHORT
     assert found[1:] == [expected] * 200
 
@@ -81,7 +82,7 @@ def test_the_period_is_shorter_while_most_is_lost(then: float | None, expected: 
 @pytest.mark.parametrize("loss", [0.82, 0.9, 0.97])
 def test_a_link_that_the_repetition_overloads_gets_little_more_load(loss: float) -> None:
     """As many transmissions arrive as before, so of those that are sent a smaller part does."""
-    repetition, one, found = Repetition(CertifiedConfig()), share(loss), list[int]()
+    repetition, one, found = Repetition(CONFIG), share(loss), list[int]()
     while len(found) < 2000:
         repetition.update(len(found) * LENGTH, one)
         found.append(repetition.period)
@@ -91,7 +92,7 @@ def test_a_link_that_the_repetition_overloads_gets_little_more_load(loss: float)
 
 
 def test_an_overload_that_comes_later_is_noticed() -> None:
-    repetition = Repetition(CertifiedConfig())
+    repetition = Repetition(CONFIG)
     assert set(periods(repetition, [share(0.9), *[share(0.9, SHORT)] * 60])) == {SHORT}
     found = periods(repetition, [share(0.9)] * 160, 61 * LENGTH)
     assert USUAL in found
@@ -99,7 +100,7 @@ def test_an_overload_that_comes_later_is_noticed() -> None:
 
 def test_a_loss_that_grows_is_no_overload() -> None:
     grows = [share(loss) for loss in np.linspace(0.81, 0.9, 10)]
-    found = periods(Repetition(CertifiedConfig()), [*grows, *[share(0.9, SHORT)] * 100])
+    found = periods(Repetition(CONFIG), [*grows, *[share(0.9, SHORT)] * 100])
     assert set(found) == {SHORT}
 
 
