@@ -183,3 +183,9 @@ def test_companions_of_one_process_share_the_clearances() -> None:
     one = clearance_of(obstacles, BOX, 0.5, 150_000, 1.0)
     assert clearance_of(tuple(drawn(1)), BOX, 0.5, 150_000, 1.0) is one
     assert not one.cells.flags.writeable
+
+
+def test_without_obstacles_all_places_are_free_also_outside_the_box() -> None:
+    clear = clearance_of((), BOX, 0.5, 150_000, 1.0)
+    places = np.array([BOX.box_min, BOX.box_max, np.array(BOX.box_max) + 0.1])
+    np.testing.assert_array_equal(clear.at(places), clear.most)
