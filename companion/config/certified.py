@@ -168,12 +168,13 @@ class CertifiedConfig(Settings):
         description="m, least distance of a vehicle's centre from the surfaces of fixed obstacles; null:"
         " `field.d_min`, that of two vehicles",
     )
-    plane_shift: float = Field(
-        0.75,
+    plane_shift: float | None = Field(
+        None,
         ge=0.0,
         le=0.9,
         description="how far agreed planes move with both vehicles: where one flies behind the other, it has"
-        " (1 + ``plane_shift``)/2 of the room between them; 0: a half; the same for the whole fleet",
+        " (1 + ``plane_shift``)/2 of the room between them; 0: a half; null: 0.75 in `planar` flights, or 0;"
+        " the same for the whole fleet",
     )
     clock_us: int = Field(5_000, ge=0, le=100_000, description="µs that a clock may differ from fleet time")
     fleet_time: Literal["own", "measured"] = Field(

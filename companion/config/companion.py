@@ -64,6 +64,10 @@ class OwnSurface(Settings):
     surface: SurfaceConfig = Field(description="surface around the target for this vehicle")
 
 
+_PLANE_SHIFT = 0.75
+"""``certified.plane_shift`` of flights in the plane."""
+
+
 class CompanionConfig(Settings):
     """All settings of one companion, except its links."""
 
@@ -147,6 +151,12 @@ class CompanionConfig(Settings):
     guard: GuardConfig = GuardConfig()
     rates: RatesConfig = RatesConfig()
     ground_messages: GroundMessagesConfig = GroundMessagesConfig()
+
+    @property
+    def plane_shift(self) -> float:
+        """``certified.plane_shift``; without it the one that suits flights in the plane, or in space."""
+        chosen = self.certified.plane_shift
+        return chosen if chosen is not None else _PLANE_SHIFT if self.planar else 0.0
 
     @property
     def shares_surface(self) -> bool:

@@ -62,7 +62,7 @@ def fingerprint(config: CompanionConfig, frame: FleetFrame) -> int:
         config.planar,
         *(round(length * _MICRO) for length in lengths),
         certified.clock_us,
-        round(certified.plane_shift * _MICRO),
+        round(config.plane_shift * _MICRO),
         _time_scale(config),
     ]
     if field.downwash != 1.0:

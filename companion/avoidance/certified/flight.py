@@ -74,7 +74,7 @@ class CertifiedFlight:
             further(certified),
             planar=config.planar,
             downwash=downwash,
-            shift=certified.plane_shift,
+            shift=config.plane_shift,
         )
         self.agreements = Agreements(
             own.system,

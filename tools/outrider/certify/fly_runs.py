@@ -118,5 +118,5 @@ def _terms(config: FlyConfig) -> Terms:
         from_surfaces(certified, companion.field, companion.limits),
         reach_of(companion),
         milli(companion.limits.least_u),
-        certified.plane_shift,
+        companion.plane_shift,
     )

@@ -130,7 +130,7 @@ def terms_of(scenario: Scenario) -> Terms:
         from_surfaces(certified, config.field, limits),
         reach_of(config),
         milli(limits.least_u),
-        certified.plane_shift,
+        config.plane_shift,
     )
 
 

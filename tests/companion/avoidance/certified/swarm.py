@@ -290,7 +290,13 @@ class Swarm:
         ``more``: other values of the companions' settings.
         """
         fleet = tuple(range(1, len(starts) + 1))
-        expected: dict[str, object] = {"dt_us": DT, "epoch_us": epoch, "fleet": () if strangers else fleet}
+        expected: dict[str, object] = {
+            "dt_us": DT,
+            "epoch_us": epoch,
+            # In space, too, where it is 0 by default: the laws are the same.
+            "plane_shift": 0.75,
+            "fleet": () if strangers else fleet,
+        }
         certified = CertifiedConfig.model_validate({**expected, **(settings or {})})
         limits = LimitsConfig() if v_max is None else LimitsConfig(v_max=v_max)
         document: dict[str, object] = {"task": "goto", "avoidance": "certified", "turning_sense": "right"}
@@ -447,7 +453,7 @@ class Swarm:
             relative[..., 2] = travel[:, 2] = 0.0
         motion = travel.sum(axis=0) / (1.0 + np.linalg.norm(travel, axis=1).sum())
         normals = nearest(relative)
-        share = 0.5 * (1.0 - self.config.certified.plane_shift * normals @ motion)[:, None]
+        share = 0.5 * (1.0 - self.config.plane_shift * normals @ motion)[:, None]
         gap = np.minimum(self.d + columns * self._further, np.einsum("nk,nik->ni", normals, relative))
         least = np.einsum("nk,nik->ni", normals, own) - share * (
             np.einsum("nk,nik->ni", normals, relative) - gap
