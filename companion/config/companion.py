@@ -156,7 +156,8 @@ class CompanionConfig(Settings):
     def plane_shift(self) -> float:
         """``certified.plane_shift``; without it the one that suits flights in the plane, or in space."""
         chosen = self.certified.plane_shift
-        return chosen if chosen is not None else _PLANE_SHIFT if self.planar else 0.0
+        # Rounded as in the fingerprint, so that all vehicles of a fleet have the same number.
+        return round(chosen if chosen is not None else _PLANE_SHIFT if self.planar else 0.0, 6)
 
     @property
     def shares_surface(self) -> bool:

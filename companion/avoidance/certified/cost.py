@@ -2,7 +2,7 @@
 
 The cost of a destination at rest weighs the place where the plan comes to rest far more than the places
 before. A destination that moves is followed: the weights of the places decrease with time, because the
-prediction of the target is good for a second only, and because a plan that has to come to rest 3.2 s ahead
+prediction of the target is good for a second only, and because a plan that has to come to rest 3.5 s ahead
 can be near the moving destination at first but not at its end.
 """
 

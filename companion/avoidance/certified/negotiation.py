@@ -18,7 +18,7 @@ from companion.avoidance.certified.agreed_planes import Rows, made, stacked
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan
-from companion.avoidance.certified.separating_planes import keeps
+from companion.avoidance.certified.separating_planes import SHARE, keeps
 from companion.values.horizon import Array
 from mavlink_bridge.wire.plan import WirePlan
 
@@ -26,6 +26,9 @@ _MOST_KEPT = 5
 """Number of agreements of a pair with which nothing is proposed any more."""
 _OVERDUE = 0.5
 """Round trips after which an unanswered proposal is followed by another."""
+
+_OTHER_SHARE = 0.05
+"""Difference of shares of the room from which on the planes of two agreements are not the same."""
 
 _LATE_US = 2_000_000
 """Age (µs) from which on a plan of an offer that has not been received is not expected any more."""
@@ -230,9 +233,12 @@ class Negotiation:
         )
 
     def _same(self, before: AgreedPlans, after: AgreedPlans) -> bool:
-        """Return whether both plans of an agreement are the earlier ones, carried on."""
+        """Return whether both plans of an agreement are the earlier ones, carried on, and share the room so.
+
+        Plans that have come to rest since then share it equally, whereas the one that flew behind had more.
+        """
         epoch = max(after.own.plan.epoch, after.other.plan.epoch)
-        return all(
+        carried_on = all(
             one is two
             or (
                 one.plan.column == two.plan.column
@@ -240,6 +246,15 @@ class Negotiation:
             )
             for one, two in zip(before, after, strict=True)
         )
+        if not carried_on:
+            return False
+        rows = stacked(
+            [made(*plans, self._geometry.agreed) for plans in (before, after)],
+            epoch,
+            after.own.plan.dt,
+            self._steps,
+        )
+        return float(abs(rows[0, :, SHARE] - rows[1, :, SHARE]).max()) <= _OTHER_SHARE
 
     def _kept(self, plan: StoredPlan, plans: AgreedPlans, epoch: int) -> bool:
         """Return whether ``plan`` keeps the planes of an agreement from ``epoch`` (µs) on, for ever.

@@ -38,6 +38,8 @@ from companion.values.horizon import Array
 _TINY = 1e-12
 AGREED = 13
 """Length of a row of ``agreed_planes``."""
+SHARE = 12
+"""Index of λ in such a row."""
 _TRAVEL_M = 1.0
 """Travel added to that of both plans: planes shift little between plans that hardly move."""
 
@@ -47,10 +49,10 @@ class Others(NamedTuple):
 
     ``own`` and ``controls`` (M, n, 3, 3), m: control points of the own plan and of the other plan of each
     pair, on the committed plan's knots. ``distance`` (M, n), m: least distance on each segment. ``shares``
-    (M,): whether the other side keeps half of it itself. ``heights`` (M,): 1/w, by which differences in
+    (M,): whether the other side keeps half of the room itself. ``heights`` (M,): 1/w, by which differences in
     height are multiplied; None: 1. ``boxes``: B boxes to keep ``from_boxes`` (m) from; None: none.
     ``agreed`` (A, n + 1, 13), m: rows of ``agreed_planes`` from the beginning of the committed plan on, of
-    pairs whose other side keeps half of the distance itself; None: none.
+    agreements, whose other side keeps its own share; None: none.
     """
 
     own: Array
@@ -268,7 +270,7 @@ def _agreed(
             row[3 + i] = _dot(c, own[n, i])
             gaps[i] -= distance
             row[9 + i] = other[n, 0, i]
-        row[12] = 0.5 - 0.5 * _dot(c, motion)
+        row[SHARE] = 0.5 - 0.5 * _dot(c, motion)
 
 
 @part
@@ -314,7 +316,7 @@ def _planes(
                 c[i] = row[i]
             for i in range(3):
                 least[m, n, i], wanted[m, n, i] = _bounds(
-                    c, row[3 + i], row[6 + i], row[12], spare, committed[n, i]
+                    c, row[3 + i], row[6 + i], row[SHARE], spare, committed[n, i]
                 )
     relative, candidate, gaps = np.empty((3, 3)), np.empty(3), np.empty(3)
     for k in range(len(controls)):
@@ -342,7 +344,7 @@ def _keeps(points: Array, rows: Array) -> bool:
     for n in range(len(points)):
         row = rows[n]
         for i in range(3):
-            least, _ = _bounds(row[:3], row[3 + i], row[6 + i], row[12], 0.0, points[n, i])
+            least, _ = _bounds(row[:3], row[3 + i], row[6 + i], row[SHARE], 0.0, points[n, i])
             if not _dot(row[:3], points[n, i]) >= least:
                 return False
     return True

@@ -68,13 +68,20 @@ sigmas, tubes = st.floats(0.0, 5.0), st.floats(0.001, 100.0)
     sigmas,
     st.floats(-89.0, 89.0),
     st.floats(0.01, 30.0),
+    st.none() | st.floats(0.0, 0.9),
 )
 def test_it_is_read_as_it_was_written(
-    fleet: tuple[int, ...], tube: float, clock: int, sigma: float, latitude: float, speed: float
+    fleet: tuple[int, ...],
+    tube: float,
+    clock: int,
+    sigma: float,
+    latitude: float,
+    speed: float,
+    shift: float | None,
 ) -> None:
     config = CompanionConfig.model_validate(
         {
-            "certified": {"fleet": fleet, "tube": tube, "clock_us": clock},
+            "certified": {"fleet": fleet, "tube": tube, "clock_us": clock, "plane_shift": shift},
             "field": {"position_sigma": sigma},
             "limits": {"v_max": (speed, speed, speed)},
             "tangential": {"d_band": 10.0},
@@ -84,6 +91,13 @@ def test_it_is_read_as_it_was_written(
     text = text_of(written)
     assert read(text.encode(), "fleet.yaml", FleetFile) == written
     assert text_of(read(text.encode(), "fleet.yaml", FleetFile)) == text
+
+
+def test_the_shift_of_planes_is_the_same_for_all(tmp_path: Path) -> None:
+    (tmp_path / "fleet.yaml").write_text(text_of(made(plane_shift=0.5)), encoding="utf-8")
+    assert loaded(companion_file(tmp_path)).companion.plane_shift == 0.5
+    with pytest.raises(InputError, match=r"certified\.plane_shift: is 0\.25, and 0\.5 in"):
+        loaded(companion_file(tmp_path, {"certified": {"plane_shift": 0.25}}))
 
 
 TEXT = text_of(made())

@@ -85,6 +85,9 @@ class FleetFile(Settings):
     clock_us: int = Field(ge=0, le=100_000)
     v_max: Bounds
     v_min: Floors | None = Field(None, description="m/s, least velocity on each axis; null: -v_max")
+    plane_shift: float | None = Field(
+        None, ge=0.0, le=0.9, description="certified.plane_shift; null: the default of `planar`"
+    )
     fleet_time: Literal["own", "measured"]
     reference: SystemId | None
     measured: Measurement
@@ -101,7 +104,8 @@ class FleetFile(Settings):
         if found != self.fingerprint:
             raise ValueError(
                 f"fingerprint: {self.fingerprint} is not that of these settings, which have {found}: the file"
-                " was changed after it was measured; needed: the file as outrider preflight wrote it"
+                " was changed after it was measured, or is of another version; needed: the file as outrider"
+                " preflight of this version writes it"
             )
         distance = distance_of(config)
         if abs(distance - self.distance) > _DISTANCE_TOLERANCE:
@@ -146,6 +150,7 @@ def settings_of(config: CompanionConfig, origin: FleetOrigin, measured: Measurem
         clock_us=certified.clock_us,
         v_max=config.limits.v_max,
         v_min=config.limits.v_min,
+        plane_shift=certified.plane_shift,
         fleet_time=certified.fleet_time,
         reference=certified.time_sources.reference,
         measured=measured,
@@ -154,8 +159,9 @@ def settings_of(config: CompanionConfig, origin: FleetOrigin, measured: Measurem
 
 def text_of(file: FleetFile) -> str:
     """Return the text of a fleet file; the same values give the same text."""
-    # A line for least velocities only where they are not those of v_max.
-    left_out = {"fingerprint"} if file.v_min else {"fingerprint", "v_min"}
+    # A line for these only where they are stated.
+    unstated = {name for name in ("v_min", "plane_shift") if getattr(file, name) is None}
+    left_out = {"fingerprint", *unstated}
     document = file.model_dump(mode="json", exclude=left_out)
     body = yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
     return (
@@ -220,6 +226,7 @@ def _common(fleet: FleetFile) -> tuple[_Common, ...]:
         _Common(("certified", "clock_us"), fleet.clock_us),
         _Common(("limits", "v_max"), fleet.v_max),
         _Common(("limits", "v_min"), fleet.v_min),
+        _Common(("certified", "plane_shift"), fleet.plane_shift),
         _Common(("certified", "fleet_time"), fleet.fleet_time),
         _Common(("certified", "time_sources", "reference"), fleet.reference),
         _Common(("certified", "fleet"), tuple(sorted(fleet.roster))),

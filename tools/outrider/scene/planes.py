@@ -1,4 +1,8 @@
-"""Planes that separate committed plans, computed from the plans in the same way as in the companions."""
+"""Planes in the middle between committed plans, along the normals of the companions' planes.
+
+Companions keep to planes of agreements, which rest on older plans and may lie nearer to the vehicle ahead of
+another one (``separating_planes``); pictures show the newest plans.
+"""
 
 from __future__ import annotations
 

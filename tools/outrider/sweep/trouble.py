@@ -18,6 +18,7 @@ from sitl.estimation.profiles import PROFILES
 Milliseconds = Annotated[float, Field(ge=0.0, le=5_000.0)]
 Seconds = Annotated[float, Field(gt=0.0, le=120.0)]
 _KNOT_US = CertifiedConfig().dt_us
+_LONGEST_US = 2_000_000
 Few = Annotated[int, Field(ge=0, le=20)]
 
 
@@ -92,7 +93,8 @@ def strike(trouble: Trouble, count: int, random: np.random.Generator) -> dict[st
     if trouble.fitting_epochs > random.uniform():
         # The epoch is then at least the largest delay of a plan that is neither lost nor reordered.
         epochs = max(int(np.ceil((delay_ms + jitter_ms) / (1e-3 * _KNOT_US))), 1)
-        document["companion"] = {"certified": {"epoch_us": _KNOT_US * epochs}}
+        epoch_us = _KNOT_US * min(epochs, _LONGEST_US // _KNOT_US)
+        document["companion"] = {"certified": {"epoch_us": epoch_us}}
     document["links"] = {
         "swarm": {
             "loss": loss,

@@ -9,12 +9,15 @@ from hypothesis import strategies as st
 
 from companion.avoidance.certified.agreed_planes import made, stacked
 from companion.avoidance.certified.columns import Distances, levelled
-from companion.avoidance.certified.committed import controls
+from companion.avoidance.certified.committed import carried_on, committed, controls, resting
 from companion.avoidance.certified.deadlock import mean_velocities
-from companion.avoidance.certified.peer_plans import StoredPlan, stored
+from companion.avoidance.certified.negotiation import Geometry, Negotiation
+from companion.avoidance.certified.pair import Agreement
+from companion.avoidance.certified.peer import Peer
+from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan, stored
 from companion.avoidance.certified.separating_planes import Others, planes
 from companion.errors import CompanionError
-from tests.companion.avoidance.certified.plans import DT, STEPS, random_plan
+from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS, random_plan
 
 LENGTH = DT
 """Length of an epoch, µs."""
@@ -87,3 +90,24 @@ def test_they_come_before_those_of_pairs_that_share_nothing() -> None:
     assert found.normals.shape == (3, STEPS, 3)
     np.testing.assert_array_equal(found.normals[0], found.normals[1])
     assert found.normals[2, 0] @ (1.0, 0.0, 0.0) == pytest.approx(-1.0, abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("shift", "epochs", "current"), [(0.75, 1, True), (0.75, 12, False), (0.0, 12, True)]
+)
+def test_an_agreement_of_the_flight_is_not_as_good_as_one_at_rest(
+    shift: float, epochs: int, current: bool
+) -> None:
+    """Of two that flew in a row and rest as planned the one ahead would have an eighth of the room."""
+    pushes = np.zeros((STEPS, 3))
+    pushes[:5, 0], pushes[5:10, 0] = 2.0, -2.0
+    files = PlanFile(), PlanFile()
+    for file, x in zip(files, (0.0, 5.0), strict=True):
+        plan = committed(resting(EPOCH, DT, STEPS, (x, 0.0, 5.0), 7), pushes)
+        for one in (plan, carried_on(plan, epochs)):
+            file.add(stored(one))
+    distances = Distances(1.5, FURTHER, planar=True, shift=shift)
+    negotiation = Negotiation(files[0], STEPS, Geometry(distances.apart, distances.agreed))
+    peer = Peer(1, 2)
+    peer.plans, peer.pair.kept = files[1], (Agreement(EPOCH, EPOCH),)
+    assert negotiation.current(peer, EPOCH + epochs * DT) is current
