@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.avoidance.certified import columns
+from companion.avoidance.certified import negotiation
 from companion.avoidance.certified.agreed_planes import AgreedPlanes, made
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.pair import Agreement, Pair
@@ -332,7 +332,7 @@ def without_agreements(patch: pytest.MonkeyPatch) -> None:
 
 def without_refusals(patch: pytest.MonkeyPatch) -> None:
     """What the peer has proposed is taken, whether or not the own plan keeps it."""
-    patch.setattr(columns, "keeps", lambda *_, **__: True)
+    patch.setattr(negotiation, "keeps", lambda *_, **__: True)
 
 
 def withdrawn_unconsidered(patch: pytest.MonkeyPatch) -> None:

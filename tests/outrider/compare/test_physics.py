@@ -209,7 +209,9 @@ def test_ten_whose_goals_lie_beside_the_lattice_s_places_change_sides_through_a_
         1,
         planar=True,
         settings={
-            key: value for key, value in companion["certified"].items() if key not in ("fleet", "epoch_us")
+            key: value
+            for key, value in companion["certified"].items()
+            if key not in ("fleet", "dt_us", "epoch_us", "plane_shift")
         },
         more={
             **{key: companion[key] for key in own},
