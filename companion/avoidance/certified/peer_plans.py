@@ -23,6 +23,11 @@ class StoredPlan(NamedTuple):
     controls: Array
     rested: Array
 
+    @property
+    def still(self) -> bool:
+        """Whether the vehicle stays where the plan begins."""
+        return bool((self.controls == self.controls[-1, 2]).all())
+
     def later(self, epoch: int, rows: int) -> Array:
         """Return ``rows`` ≤ 2n control points (rows, 3, 3), m, from ``epoch`` (µs) on.
 

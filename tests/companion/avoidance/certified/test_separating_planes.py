@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.avoidance.certified.separating_planes import (
+    SHARE,
     Others,
     Planes,
     agreed_planes,
@@ -242,7 +243,7 @@ def test_a_plan_keeps_an_agreement_if_it_is_on_its_side_of_every_plane(seed: int
 def test_planes_move_with_both_plans(seed: int, upright: bool) -> None:
     """Their shares of the room make one; of two that fly in a row the one behind has more."""
     pair = Pair(seed, upright=upright)
-    mine, others = (rows[:, 12] for rows in pair.rows)
+    mine, others = (rows[:, SHARE] for rows in pair.rows)
     np.testing.assert_allclose(mine + others, 1.0, rtol=0.0, atol=1e-15)
     assert ((mine >= 0.05) & (mine <= 0.95)).all()
     away, aside = np.array([50.0, 0.0, 0.0]), np.array([0.0, 50.0, 0.0])
@@ -252,7 +253,7 @@ def test_planes_move_with_both_plans(seed: int, upright: bool) -> None:
         found = agreed_planes(
             flown + np.array([100.0, 0.0, 0.0]), flown, 1.0, upright=upright, shift=pair.shift
         )
-        np.testing.assert_allclose(found[:, 12], share, rtol=0.0, atol=0.01)
+        np.testing.assert_allclose(found[:, SHARE], share, rtol=0.0, atol=0.01)
 
 
 @given(seeds)
