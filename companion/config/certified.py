@@ -25,7 +25,7 @@ class DeadlockConfig(Settings):
         3.0, description="m: on a turn that is larger than ``bend`` the goal is no further"
     )
     up: Positive = Field(4.0, description="rad/s at which it turns aside where it is pushed back in full")
-    down: Positive = Field(6.0, description="rad/s at which it turns back")
+    down: Positive = Field(10.0, description="rad/s at which it turns back")
     chase: Positive = Field(
         1.0, description="m/s to the side and ahead with which another vehicle is not turned away from"
     )
@@ -57,8 +57,15 @@ class AnticipationConfig(Settings):
         description="s: while somebody is met, the plan aims no further ahead than v_max flies in this time,"
         " or than the vehicle needs to brake from v_max",
     )
+    wide_late: float = Field(
+        1.7,
+        ge=0.0,
+        le=100.0,
+        description="1/s: share of the least distance of plans that the wanted one grows by for each second"
+        " that the plans of agreements are older than two epochs on average, up to twice this age",
+    )
     fresh: Positive = Field(
-        0.6,
+        1.0,
         description="s: with agreements on plans that are older on average, a plan aims as far ahead as if"
         " nobody were met",
     )
@@ -211,7 +218,7 @@ class CertifiedConfig(Settings):
     omega_end: Positive = Field(30.0, description="weight of where the plan comes to rest")
     omega_place: Weight = Field(0.3, description="weight of where it is after each step before")
     omega_speed: Weight = Field(0.1, description="weight of its speeds")
-    omega_input: Positive = Field(0.05, description="weight of a")
+    omega_input: Positive = Field(0.02, description="weight of a")
     omega_field: Weight = Field(0.3, description="weight of the field of those that share no plan")
     omega_jerk: Weight = Field(0.3, description="weight of the change of a from step to step")
     spare: Positive = Field(0.01, description="m wanted beyond the least distance, for rounding")

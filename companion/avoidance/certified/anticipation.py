@@ -7,13 +7,17 @@ from where they are, equally fast. Seen from above let two be nearest after a ve
 other one at the signed distance m on the side away from the turn, and let D be the least distance of plans
 plus ``wide`` · v_max. The encounter has the weight w = 1 − m/D within [0, 1].
 
+A vehicle on the circle gets the room that the one before it leaves once they agree on newer plans. So the
+older the plans of agreements are, the wider apart vehicles must be to fly on without a stop: from an age of
+two epochs on, D grows by ``wide_late`` times the least distance for each second, up to twice this age.
+
 Vehicles that all turn to one side fly round the place where they meet. K = 1 + Σ w of them have a distance of
 about D from each other on a circle of radius K D / 2π. So the goal is turned by atan(``room`` · min(1, Σ w) ·
 K D / (2π ℓ)), with the weighted mean of ℓ, and by ``most`` at most. While there is an encounter, the plan
 aims no further ahead than v_max flies in ``reach``, or than the vehicle needs to brake from v_max: rest
 points further ahead leave the others less room and do not make the vehicle faster. That is so while
-agreements rest on ``fresh`` plans: with old ones the planes follow late, and rest points must lie further
-ahead.
+agreements rest on ``fresh`` plans: with older ones the planes follow so late that rest points must lie
+further ahead.
 
 Two vehicles need no circle: one plane between them leaves both their straight ways, or nearly so. So a
 vehicle begins to anticipate when Σ w > 1, which takes two others, and goes on until it meets nobody. In space
@@ -21,7 +25,8 @@ planes lead vehicles over each other, which is shorter than a circle: so it is f
 
 A circle that reaches beyond the goal does not fit: the vehicle would fly round further out than it has to go.
 So if ``room`` · min(1, Σ w) · K D / 2π exceeds the distance from the mean place of the encounters to the
-goal, nothing is anticipated, and the deadlock rule (``DeadlockTurn``) resolves the encounter. On the approach
+goal, with the D of new agreements, nothing is anticipated, and the deadlock rule (``DeadlockTurn``) resolves
+the encounter. With that of old ones the circle is at most as large as this distance. On the approach
 this distance stays as it is. K falls while vehicles pass; one that began to anticipate among them, when a
 smaller circle fits, would have to pass those that are pushed already. So the decision stays until nobody is
 met, or the goal is another one.
@@ -42,6 +47,8 @@ from companion.values.horizon import Array
 _AT_GOAL_M = 0.5
 """Distance from its goal below which a vehicle is not met, and beyond a goal within which it is."""
 _LEAST_WAY_M = 0.5
+_IN_TIME = 2.0
+"""Age (epochs) of the plans of agreements up to which vehicles need no more room than with new ones."""
 
 
 class Anticipated(NamedTuple):
@@ -64,14 +71,21 @@ BEYOND = Anticipated(0.0, inf, fits=False)
 class Anticipation:
     """Turns of one vehicle among several; those whose circle does not fit are left to the deadlock rule.
 
-    The arguments are those of ``anticipated``.
+    ``epoch`` (s): of the plans. The other arguments are those of ``anticipated``.
     """
 
     def __init__(
-        self, config: AnticipationConfig, least: float, speed: float, acceleration: float, sense: float
+        self,
+        config: AnticipationConfig,
+        least: float,
+        speed: float,
+        acceleration: float,
+        sense: float,
+        epoch: float,
     ) -> None:
         self._config, self._least, self._sense = config, least, sense
         self._speed, self._acceleration = speed, acceleration
+        self._in_time = _IN_TIME * epoch
         self.restart()
 
     def restart(self) -> None:
@@ -79,21 +93,25 @@ class Anticipation:
         self._goal: list[float] | None = None
         self._begun = self._left = False
 
-    def met(self, own: Array, others: Array) -> Anticipated:
+    def met(self, own: Array, others: Array, age: float) -> Anticipated:
         """Return how to avoid ``others`` (M, 2, 3), m, on the ``own`` way (2, 3), m.
 
-        To be called for each plan. NOBODY before several are met, and from when a circle does not fit, until
-        nobody is met or the goal is another one.
+        ``age`` (s): mean one of the plans of the agreements with the others. To be called for each plan.
+        NOBODY before several are met, and from when a circle does not fit, until nobody is met or the goal is
+        another one.
         """
         limits = self._speed, self._acceleration
-        found = anticipated(self._config, self._least, *limits, own, others, sense=self._sense)
+        late = min(max(age - self._in_time, 0.0), self._in_time)
+        found = anticipated(self._config, self._least, *limits, own, others, sense=self._sense, late=late)
         goal = own[1].tolist()
         if found == NOBODY or self._goal is None or dist(self._goal, goal) > _AT_GOAL_M:
             self.restart()
             self._goal = goal
         self._begun |= found.several
         self._left |= not found.fits
-        return found if self._begun and not self._left else NOBODY
+        if not self._begun or self._left:
+            return NOBODY
+        return found if age <= self._config.fresh else found._replace(ahead=inf)
 
 
 def anticipated(
@@ -105,18 +123,21 @@ def anticipated(
     others: Array,
     *,
     sense: float,
+    late: float = 0.0,
 ) -> Anticipated:
     """Return how to avoid encounters by a turn to the side of ``sense``: +1 right.
 
     ``least`` (m): the least distance of plans. ``speed`` (m/s) and ``acceleration`` (m/s²): the largest ones
     of the own plans. ``own`` (2, 3), m: where the own plan begins, and the goal. ``others`` (M, 2, 3), m:
-    where the other vehicles are then, and their goals. BEYOND: they need a circle that does not fit.
+    where the other vehicles are then, and their goals. ``late`` (s): by how much agreements come later than
+    in time. BEYOND: they need a circle that does not fit.
     """
     place, goal = own.tolist()
     way, x, y = _direction(place, goal)
     if way < _AT_GOAL_M:
         return NOBODY
-    distance = least + config.wide * speed
+    in_time = least + config.wide * speed
+    distance = in_time + config.wide_late * late * least
     weights = lengths = 0.0
     for there, its_goal in others.tolist():
         its_way, along, across = _direction(there, its_goal)
@@ -139,10 +160,11 @@ def anticipated(
         lengths += weight * length
     if weights <= 0.0:
         return NOBODY
-    radius = config.room * min(weights, 1.0) * (1.0 + weights) * distance / (2.0 * pi)
+    distances = config.room * min(weights, 1.0) * (1.0 + weights) / (2.0 * pi)
     length = lengths / weights
-    if radius > way - length:
+    if distances * in_time > way - length:
         return BEYOND
+    radius = min(distances * distance, way - length)
     angle = atan2(radius, max(length, _LEAST_WAY_M))
     ahead = speed * max(config.reach, 0.5 * speed / acceleration)
     return Anticipated(min(angle, config.most), ahead, several=weights > 1.0)

@@ -68,9 +68,8 @@ class PlanGoals:
         self._space: SpaceDetour | None = None
         self._has_space = self._way is None and not config.planar
         self._least = least
-        fastest = min(limits.v_max[:2]), min(limits.u_max[:2])
-        self._anticipation = Anticipation(certified.anticipation, sources.between, *fastest, sense)
-        self._fresh = certified.anticipation.fresh
+        fastest, epoch = (min(limits.v_max[:2]), min(limits.u_max[:2])), 1e-6 * certified.epoch_us
+        self._anticipation = Anticipation(certified.anticipation, sources.between, *fastest, sense, epoch)
         in_lanes = config.way is not None and config.way.lanes is not None
         # In space vehicles pass over each other, in lanes they give way.
         self._anticipates = config.planar and certified.anticipation.most > 0.0 and not in_lanes
@@ -212,6 +211,5 @@ class PlanGoals:
         places = [plans[s].later(max(begins, plans[s].plan.epoch), 1)[0, 0] for s in met]
         ways = [(place, told[system].position_m) for system, place in zip(met, places, strict=True)]
         others = np.array(ways).reshape(-1, 2, 3)
-        found = self._anticipation.met(np.stack([start.position_m, goal]), others)
-        fresh = self._fresh
-        return found if self._agreements.age(begins, met) <= fresh else found._replace(ahead=inf)
+        age = self._agreements.age(begins, met)
+        return self._anticipation.met(np.stack([start.position_m, goal]), others, age)

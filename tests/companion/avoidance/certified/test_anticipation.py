@@ -23,6 +23,8 @@ from tests.companion.avoidance.certified.swarm import FLEET, Habits, Rough, Swar
 CONFIG = AnticipationConfig()
 LEAST, SPEED, ACCELERATION = 1.25, 5.0, 2.0
 LIMITS = LEAST, SPEED, ACCELERATION
+AN_EPOCH, NEW = 0.2, 0.0
+"""Length of an epoch and age of new agreements, s."""
 OWN = np.array([[-8.0, 0.0, 5.0], [8.0, 0.0, 5.0]])
 places = st.floats(-12.0, 12.0).map(lambda x: round(x, 3))
 points = st.tuples(places, places, st.just(5.0))
@@ -141,31 +143,57 @@ def test_a_circle_fits_where_it_does_not_reach_beyond_the_goals(
 
 def test_what_does_not_fit_is_left_until_nobody_is_met_or_the_goal_is_another() -> None:
     crowd, few = ring(16), ring(3)
-    mine = Anticipation(CONFIG, *LIMITS, 1.0)
+    mine = Anticipation(CONFIG, *LIMITS, 1.0, AN_EPOCH)
     alone = np.empty((0, 2, 3))
     turned = found(few[1:])
     assert turned.angle > 0.0
-    assert mine.met(OWN, few[1:]) == turned
-    assert mine.met(OWN, crowd[1:]) == NOBODY
+    assert mine.met(OWN, few[1:], NEW) == turned
+    assert mine.met(OWN, crowd[1:], NEW) == NOBODY
     # The others pass, one after the other, and a smaller circle would fit.
-    assert mine.met(OWN, few[1:]) == NOBODY
-    assert mine.met(OWN, alone) == NOBODY
-    assert mine.met(OWN, few[1:]) == turned
-    assert mine.met(OWN, crowd[1:]) == NOBODY
+    assert mine.met(OWN, few[1:], NEW) == NOBODY
+    assert mine.met(OWN, alone, NEW) == NOBODY
+    assert mine.met(OWN, few[1:], NEW) == turned
+    assert mine.met(OWN, crowd[1:], NEW) == NOBODY
     elsewhere = OWN + np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    assert mine.met(elsewhere, few[1:]).angle > 0.0
+    assert mine.met(elsewhere, few[1:], NEW).angle > 0.0
 
 
 def test_two_that_meet_fly_straight_until_there_is_a_third() -> None:
     """Once there are several, it anticipates until it meets nobody."""
-    mine = Anticipation(CONFIG, *LIMITS, 1.0)
+    mine = Anticipation(CONFIG, *LIMITS, 1.0, AN_EPOCH)
     one, two = ring(2)[1:], ring(4)[1:3]
     assert found(one).angle > 0.0
-    assert mine.met(OWN, one) == NOBODY
-    assert mine.met(OWN, two) == found(two) != NOBODY
-    assert mine.met(OWN, one) == found(one)
-    assert mine.met(OWN, np.empty((0, 2, 3))) == NOBODY
-    assert mine.met(OWN, one) == NOBODY
+    assert mine.met(OWN, one, NEW) == NOBODY
+    assert mine.met(OWN, two, NEW) == found(two) != NOBODY
+    assert mine.met(OWN, one, NEW) == found(one)
+    assert mine.met(OWN, np.empty((0, 2, 3)), NEW) == NOBODY
+    assert mine.met(OWN, one, NEW) == NOBODY
+
+
+def at_age(age: float, others: Array) -> Anticipated:
+    """Return what a vehicle does that has agreements on plans of this ``age`` (s)."""
+    return Anticipation(CONFIG, *LIMITS, 1.0, AN_EPOCH).met(OWN, others, age)
+
+
+@given(st.floats(0.0, 3.0), st.floats(0.0, 3.0))
+def test_the_older_the_agreements_the_larger_the_circle(one: float, two: float) -> None:
+    """Not before they are two epochs old, and as for twice this age from then on."""
+    others = ring(4)[1:]
+    young, old = sorted((one, two))
+    assert at_age(young, others).angle <= at_age(old, others).angle
+    assert at_age(min(young, 0.4), others) == at_age(0.0, others)
+    assert at_age(0.8 + old, others).angle == at_age(0.8, others).angle
+    late = min(max(old - 0.4, 0.0), 0.4)
+    apart = 2.0 * 8.0 * np.sin(at_age(old, others).angle) * np.sin(np.pi / 4)
+    assert apart >= LEAST * (1.0 + CONFIG.wide_late * late)
+
+
+def test_the_circle_of_old_agreements_does_not_reach_beyond_the_goals() -> None:
+    """It is at most as large as that; so who has new agreements and who has old ones both anticipate."""
+    crowd = ring(10)[1:]
+    new, old = at_age(0.0, crowd), at_age(0.8, crowd)
+    assert new != NOBODY != old
+    assert np.tan(new.angle) < np.tan(old.angle) == pytest.approx(1.0, abs=0.05)
 
 
 @cache
@@ -198,9 +226,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Recorded]:
     found: list[Recorded] = []
     met = Anticipation.met
 
-    def recorded(self: Anticipation, own: Array, others: Array) -> Anticipated:
+    def recorded(self: Anticipation, own: Array, others: Array, age: float) -> Anticipated:
         found.append(Recorded(own[1], len(others)))
-        return met(self, own, others)
+        return met(self, own, others, age)
 
     monkeypatch.setattr(Anticipation, "met", recorded)
     return found
