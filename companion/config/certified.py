@@ -25,7 +25,7 @@ class DeadlockConfig(Settings):
         3.0, description="m: on a turn that is larger than ``bend`` the goal is no further"
     )
     up: Positive = Field(4.0, description="rad/s at which it turns aside where it is pushed back in full")
-    down: Positive = Field(10.0, description="rad/s at which it turns back")
+    down: Positive = Field(6.0, description="rad/s at which it turns back")
     chase: Positive = Field(
         1.0, description="m/s to the side and ahead with which another vehicle is not turned away from"
     )
@@ -220,7 +220,7 @@ class CertifiedConfig(Settings):
     omega_speed: Weight = Field(0.1, description="weight of its speeds")
     omega_input: Positive = Field(0.02, description="weight of a")
     omega_field: Weight = Field(0.3, description="weight of the field of those that share no plan")
-    omega_jerk: Weight = Field(0.3, description="weight of the change of a from step to step")
+    omega_jerk: Weight = Field(0.2, description="weight of the change of a from step to step")
     spare: Positive = Field(0.01, description="m wanted beyond the least distance, for rounding")
     following: FollowingConfig = FollowingConfig()
     deadlock: DeadlockConfig = DeadlockConfig()
