@@ -63,7 +63,7 @@ class ConstraintSources:
         self._boxes = BoxIndex(boxes_of(config.obstacles))
         self._noncooperative = NonCooperative(config, steps)
         none = np.empty((0, steps, 3, 3))
-        self._nothing = none, none, np.empty((0, steps)), np.empty(0, np.bool_), np.empty(0)
+        self._nothing = none, none, np.empty((0, steps)), np.empty(0)
         widest = max(self.between, self._from_surfaces)
         self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + widest + _SIGHT_MARGIN_M
 
@@ -115,8 +115,8 @@ class ConstraintSources:
 
     def _unshared(
         self, own: Array, given: list[tuple[Array, Array | float]], vehicles: list[int]
-    ) -> tuple[Array, Array, Array, NDArray[np.bool_], Array]:
-        """Return the first five parts of ``Others`` for what keeps no distance itself.
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return the first four parts of ``Others`` for what keeps no distance itself.
 
         ``given``: its control points (n, 3, 3) and least distances, m, of which those of ``vehicles`` count
         heights as vehicles do.
@@ -128,8 +128,7 @@ class ConstraintSources:
             distance[index] = radii
         heights = np.ones(len(given))
         heights[vehicles] = 1.0 / self._config.field.downwash
-        shares = np.zeros(len(given), np.bool_)
-        return np.stack([own] * len(given)), np.stack([one for one, _ in given]), distance, shares, heights
+        return np.stack([own] * len(given)), np.stack([one for one, _ in given]), distance, heights
 
     def _beyond_range(self, distant: dict[int, int], world: World) -> set[int]:
         """Return those of the ``distant`` vehicles that constrain no plan.

@@ -28,7 +28,6 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.avoidance.certified.box_planes import box_planes
 from companion.values.boxes import Boxes
@@ -45,12 +44,12 @@ _TRAVEL_M = 1.0
 
 
 class Others(NamedTuple):
-    """A agreements and M pairs of plans whose planes a plan keeps to.
+    """A agreements, and M pairs of plans of which the own side keeps the whole distance, for a new plan.
 
     ``own`` and ``controls`` (M, n, 3, 3), m: control points of the own plan and of the other plan of each
-    pair, on the committed plan's knots. ``distance`` (M, n), m: least distance on each segment. ``shares``
-    (M,): whether the other side keeps half of the room itself. ``heights`` (M,): 1/w, by which differences in
-    height are multiplied; None: 1. ``boxes``: B boxes to keep ``from_boxes`` (m) from; None: none.
+    pair, on the committed plan's knots. ``distance`` (M, n), m: least distance on each segment. ``heights``
+    (M,): 1/w, by which differences in height are multiplied; None: 1. ``boxes``: B boxes to keep
+    ``from_boxes`` (m) from; None: none.
     ``agreed`` (A, n + 1, 13), m: rows of ``agreed_planes`` from the beginning of the committed plan on, of
     agreements, whose other side keeps its own share; None: none.
     """
@@ -58,7 +57,6 @@ class Others(NamedTuple):
     own: Array
     controls: Array
     distance: Array
-    shares: NDArray[np.bool_]
     heights: Array | None = None
     boxes: Boxes | None = None
     from_boxes: float = 0.0
@@ -92,7 +90,7 @@ def planes(committed: Array, others: Others, spare: float, *, upright: bool = Fa
         np.ascontiguousarray, (committed, others.own, others.controls, others.distance)
     )
     heights = np.ones(len(own)) if others.heights is None else np.ascontiguousarray(others.heights)
-    _planes(committed, agreed, own, controls, distance, others.shares, heights, spare, upright, *found)
+    _planes(committed, agreed, own, controls, distance, heights, spare, upright, *found)
     if others.boxes is None or not len(others.boxes.centres):
         return found
     of_boxes = box_planes(committed, others.boxes, others.from_boxes, spare, upright=upright)
@@ -288,7 +286,6 @@ def _bounds(
     *[array(3)] * 2,
     *[array(4)] * 2,
     array(2),
-    array(1, BOOL),
     array(1),
     FLOAT,
     BOOL,
@@ -300,7 +297,6 @@ def _planes(
     own: Array,
     controls: Array,
     distance: Array,
-    shares: NDArray[np.bool_],
     heights: Array,
     spare: float,
     upright: bool,
@@ -320,13 +316,13 @@ def _planes(
                 )
     relative, candidate, gaps = np.empty((3, 3)), np.empty(3), np.empty(3)
     for k in range(len(controls)):
-        m, half = len(agreed) + k, 0.5 if shares[k] else 1.0
+        m = len(agreed) + k
         for n in range(len(committed)):
             c = normals[m, n]
             _gaps(own[k, n], controls[k, n], heights[k], upright, relative, candidate, c, gaps)
             for i in range(3):
                 here, gap = _dot(c, own[k, n, i]), gaps[i] - distance[k, n]
-                least[m, n, i], wanted[m, n, i] = _bounds(c, here, gap, half, spare, committed[n, i])
+                least[m, n, i], wanted[m, n, i] = _bounds(c, here, gap, 1.0, spare, committed[n, i])
 
 
 @kernel(BOOL, array(3), array(3), array(3))

@@ -9,7 +9,7 @@ import numpy as np
 
 from companion.avoidance.certified.committed import carried_on, controls
 from companion.avoidance.certified.qp import Objective, SeparationQp, State
-from companion.avoidance.certified.separating_planes import Others, Planes, planes
+from companion.avoidance.certified.separating_planes import AGREED, Others, Planes, agreed_planes, planes
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Array, roll_out
@@ -55,19 +55,23 @@ def scene(seed: int, limits: LimitsConfig = WIDE, *, wishes: int = 1) -> Scene:
     count, spread = int(rng.integers(0, 8)), 10.0 ** rng.uniform(-0.3, 0.9)
     others = [later(random_plan(rng, here + spread * rng.normal(size=3))) for _ in range(count)]
     own = controls(start)
-    corridor = planes(
-        own,
-        Others(
-            np.broadcast_to(own, (count, STEPS, 3, 3)),
-            np.stack([np.zeros((STEPS, 3, 3)), *others])[1:],
-            np.full((count, STEPS), rng.uniform(0.3, 2.0)),
-            rng.uniform(size=count) < 0.8,
-        ),
-        CONFIG.spare,
-    )
+    d = rng.uniform(0.3, 2.0)
+    agreed = rng.uniform(size=count) < 0.8
+    plans = np.array(others).reshape(count, STEPS, 3, 3)
+    corridor = planes(own, around(own, plans[agreed], plans[~agreed], d), CONFIG.spare)
     before = rng.uniform(-2, 2, 3)
     state = State(start.position_m, start.velocity_m_s, before, start.accelerations_m_s2)
     return Scene(limits, start, state, corridor, tuple(wish(rng, here) for _ in range(wishes)))
+
+
+def around(own: Array, agreed: Array, unshared: Array, d: float) -> Others:
+    """What a plan from which each other one is to be ``d`` (m) apart keeps to; control points are in m.
+
+    ``own`` (n, 3, 3); plans with which there is an agreement, and those that share nothing, (k, n, 3, 3).
+    """
+    rows = np.array([agreed_planes(own, other, d) for other in agreed]).reshape(-1, STEPS, AGREED)
+    count = len(unshared)
+    return Others(np.broadcast_to(own, unshared.shape), unshared, np.full((count, STEPS), d), agreed=rows)
 
 
 def jam(seed: int) -> Scene:
@@ -76,17 +80,12 @@ def jam(seed: int) -> Scene:
     rng = np.random.default_rng(seed)
     here, d = np.array([0.0, 0.0, 5.0]), 0.9
     start = carried_on(random_plan(rng, here), int(rng.choice([0, STEPS])))
-    around = rng.normal(size=(int(rng.integers(2, 8)), 3))
-    around /= np.linalg.norm(around, axis=1, keepdims=True)
-    around = np.concatenate([around, -around])
+    ways = rng.normal(size=(int(rng.integers(2, 8)), 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    ways = np.concatenate([ways, -ways])
     gap = rng.choice([rng.uniform(0.3, d), d, d + 10.0 ** rng.uniform(-9, -2)])
-    own, count = controls(start), len(around)
-    apart = Others(
-        np.broadcast_to(own, (count, STEPS, 3, 3)),
-        own + gap * around[:, None, None],
-        np.full((count, STEPS), d),
-        np.ones(count, dtype=np.bool_),
-    )
+    own = controls(start)
+    apart = around(own, own + gap * ways[:, None, None], np.empty((0, STEPS, 3, 3)), d)
     state = State(start.position_m, start.velocity_m_s, np.zeros(3), start.accelerations_m_s2)
     return Scene(WIDE, start, state, planes(own, apart, CONFIG.spare), (wish(rng, here),))
 

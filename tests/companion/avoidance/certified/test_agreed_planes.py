@@ -15,12 +15,13 @@ from companion.avoidance.certified.negotiation import Geometry, Negotiation
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan, stored
-from companion.avoidance.certified.separating_planes import Others, planes
+from companion.avoidance.certified.separating_planes import Others, agreed_planes, planes
 from companion.errors import CompanionError
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS, random_plan
 
 LENGTH = DT
 """Length of an epoch, µs."""
+NOTHING = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)))
 FURTHER = 0.25
 """Distance (m) that each column adds."""
 
@@ -52,15 +53,16 @@ def test_they_are_those_of_the_two_plans(
     one, two = own.later(begins, STEPS), other.later(begins, STEPS)
     if any(columns):
         two = levelled(two, one)
-    least, heights = np.full((1, STEPS), distances.least(sum(columns))), np.full(1, 1.0 / downwash)
-    whole = Others(one[None], two[None], least, np.ones(1, np.bool_), heights)
-    none = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, np.bool_), np.zeros(0))
-    agreed = none._replace(agreed=stacked([made(own, other, distances.agreed)], begins, DT, STEPS))
-    expected = planes(committed, whole, 0.02, upright=planar)
+    least = distances.least(sum(columns))
+    rows = agreed_planes(one, two, least, upright=planar, downwash=downwash)
+    unshared = Others(one[None], two[None], np.full((1, STEPS), least), np.full(1, 1.0 / downwash))
+    agreed = NOTHING._replace(agreed=stacked([made(own, other, distances.agreed)], begins, DT, STEPS))
+    expected = planes(committed, NOTHING._replace(agreed=rows[None]), 0.02, upright=planar)
     found = planes(committed, agreed, 0.02, upright=planar)
     for part, wanted in zip(found, expected, strict=True):
         np.testing.assert_array_equal(part, wanted)
-    velocities = (mean_velocities(others, 1.0, 2) for others in (agreed, whole))
+    np.testing.assert_array_equal(found.normals, planes(committed, unshared, 0.02, upright=planar).normals)
+    velocities = (mean_velocities(others, 1.0, 2) for others in (agreed, unshared))
     np.testing.assert_array_equal(*velocities)
 
 
@@ -83,7 +85,6 @@ def test_they_come_before_those_of_pairs_that_share_nothing() -> None:
         committed[None],
         ball[None],
         np.full((1, STEPS), 1.0),
-        np.zeros(1, np.bool_),
         agreed=stacked([planes_of, planes_of], begins, DT, STEPS),
     )
     found = planes(committed, both, 0.0)

@@ -87,7 +87,7 @@ class Here:
         others, field = self._sources.around(
             now, epoch(number), own, self.agreements, self.world, View(None, None, None, None)
         )
-        return Constraints(len(others.shares), bool(field.any()), float(others.distance.max(initial=0.0)))
+        return Constraints(len(others.own), bool(field.any()), float(others.distance.max(initial=0.0)))
 
 
 class Constraints(NamedTuple):

@@ -66,7 +66,7 @@ def test_the_committed_plan_keeps_its_rows_to_the_last_bit_wherever_it_is(seed: 
     own = triangles(rng, 60)
     boxes = drawn(rng, 20)
     for upright in (False, True):
-        none = Others(*np.zeros((2, 0, 60, 3, 3)), np.zeros((0, 60)), np.zeros(0, dtype=np.bool_))
+        none = Others(*np.zeros((2, 0, 60, 3, 3)), np.zeros((0, 60)))
         found = planes(own, none._replace(boxes=boxes, from_boxes=0.7), SPARE, upright=upright)
         assert kept(found, own)
         assert (np.einsum("mnk,nik->mni", found.normals, own) >= found.wanted - 1e-12).all()

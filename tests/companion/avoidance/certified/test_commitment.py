@@ -17,7 +17,7 @@ from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.detour import Subgoal
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.qp import Objective, SeparationQp
-from companion.avoidance.certified.separating_planes import Others, hull_distance
+from companion.avoidance.certified.separating_planes import Others, agreed_planes, hull_distance
 from companion.config import CompanionConfig
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import HorizonConfig, LimitsConfig
@@ -32,7 +32,7 @@ LENGTH = 400_000
 SHIFT = LENGTH // DT
 CONFIG = CertifiedConfig(dt_us=DT, epoch_us=LENGTH)
 HERE = np.array([0.0, 0.0, 5.0])
-NOBODY = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, dtype=np.bool_))
+NOBODY = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)))
 seeds = st.integers(0, 2**32 - 1)
 POST = {"kind": "post", "at": [8.0, 0.0], "radius": 1.0, "height": 10.0}
 choices = st.lists(st.sampled_from(["plan", "hold", "wait", "sleep"]), max_size=12)
@@ -145,8 +145,10 @@ def test_anew_from_where_it_is_is_to_rest_and_from_the_next_epoch_on() -> None:
 
 def standing(own: Array, apart: Array, *, shares: bool) -> Others:
     """One that stands ``apart`` (3,) m from ``HERE``, from which 2 m are to be kept; ``own`` (n, 3, 3), m."""
-    there = np.broadcast_to(HERE + apart, (1, STEPS, 3, 3))
-    return Others(own[None], there, np.full((1, STEPS), 2.0), np.array([shares]))
+    there = np.broadcast_to(HERE + apart, (STEPS, 3, 3))
+    if shares:
+        return NOBODY._replace(agreed=agreed_planes(own, there, 2.0)[None])
+    return Others(own[None], there[None], np.full((1, STEPS), 2.0))
 
 
 @example(254636, 1.0, False)
@@ -160,13 +162,13 @@ def test_pulled_through_one_that_is_near_it_makes_plans_and_never_comes_nearer(
     way = rng.normal(size=3)
     way /= np.linalg.norm(way)
     goal = HERE + 6.0 * way + rng.normal(size=3)
-    other = standing(kept.own(), near * way, shares=shares)
-    least = hull_distance(kept.own() - other.controls[0]).min()
+    place = HERE + near * way
+    least = hull_distance(kept.own() - place).min()
     for epoch in range(6):
         kept.turn(EPOCH + epoch * LENGTH)
-        assert replan(kept, goal, other._replace(own=kept.own()[None]))
+        assert replan(kept, goal, standing(kept.own(), near * way, shares=shares))
         assert kept.following is not None
-        distance = hull_distance(controls(kept.following) - other.controls[0])
+        distance = hull_distance(controls(kept.following) - place)
         assert distance.min() >= min(least, 2.0) - 1e-9
 
 

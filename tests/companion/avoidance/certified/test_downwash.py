@@ -28,9 +28,12 @@ factors = st.sampled_from([1.5, 2.0, 3.0, 7.0])
 
 
 def others(own: Array, other: Array, d: float, downwash: float | None) -> Others:
-    """Return one pair of plans, of which each side keeps a half."""
+    """Return an agreement on two plans, and the same two as a pair that shares nothing."""
+    agreed = (
+        agreed_planes(own, other, d) if downwash is None else agreed_planes(own, other, d, downwash=downwash)
+    )
     heights = None if downwash is None else np.array([1.0 / downwash])
-    return Others(own[None], other[None], np.full((1, STEPS), d), np.ones(1, dtype=np.bool_), heights)
+    return Others(own[None], other[None], np.full((1, STEPS), d), heights, agreed=agreed[None])
 
 
 def in_ellipsoid(points: Array, downwash: float) -> Array:
@@ -62,7 +65,6 @@ def test_two_plans_that_keep_their_sides_are_apart_in_the_ellipsoid(seed: int, d
                 none,
                 none,
                 np.empty((0, STEPS)),
-                np.zeros(0, dtype=np.bool_),
                 agreed=agreed_planes(own, other, d, downwash=downwash, shift=shift)[None],
             ),
             SPARE,

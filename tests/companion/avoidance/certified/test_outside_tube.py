@@ -9,7 +9,6 @@ from companion.avoidance.certified.committed import controls
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.qp import Objective
-from companion.avoidance.certified.separating_planes import Others
 from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Motion
@@ -19,6 +18,7 @@ from mavlink_bridge.wire.agreements import PAYLOAD_TYPE, Statement, unpack
 from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.swarm import FLEET
 from tests.companion.avoidance.certified.test_commitment import HERE, LENGTH, STEPS, Subgoal, commitment
+from tests.companion.avoidance.certified.test_commitment import standing as beside
 
 CONFIG = CompanionConfig(task="goto", avoidance="certified", turning_sense="right")
 TUBE, EPOCH_US = CONFIG.certified.tube, CONFIG.certified.epoch_us
@@ -30,13 +30,12 @@ def pulled(apart: float, outside: float, *, shares: bool, epochs: int = 20) -> f
     """How near (m) plans come to one that stands ``apart`` m east, from which 2 m are to be kept, when their
     goal is where that one stands; one of the two is ``outside`` its tube."""
     kept, goal = commitment(), HERE + apart * EAST
-    there, distance = np.broadcast_to(goal, (1, STEPS, 3, 3)), np.full((1, STEPS), 2.0)
-    others = Others(kept.own()[None], there, distance, np.array([shares]))
+    others = beside(kept.own(), apart * EAST, shares=shares)
     objective = Objective(np.broadcast_to(goal, (STEPS, 3)), np.zeros((STEPS, 3)), np.zeros((STEPS, 3)))
     least = np.inf
     for epoch in range(epochs):
         kept.turn(EPOCH + epoch * LENGTH)
-        own = others if shares else others._replace(own=kept.own()[None])
+        own = others if shares else beside(kept.own(), apart * EAST, shares=False)
         assert kept.replan(objective, Subgoal(goal, 0.0), own, outside)
         assert kept.following is not None
         least = min(least, apart - float(controls(kept.following)[..., 0].max()))

@@ -24,7 +24,7 @@ from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS, random_p
 from tests.companion.avoidance.certified.scenes import CONFIG
 
 HERE = np.array([0.0, 0.0, 5.0])
-NOBODY = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, dtype=np.bool_))
+NOBODY = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)))
 seeds = st.integers(0, 2**32 - 1)
 
 

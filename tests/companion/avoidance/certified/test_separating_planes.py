@@ -132,7 +132,7 @@ def test_where_nothing_separates_there_is_a_unit_vector_all_the_same(spot: float
         assert np.linalg.norm(nearest(t[None])[0]) == pytest.approx(1.0)
 
 
-NOTHING = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)), np.zeros(0, dtype=np.bool_))
+NOTHING = Others(*np.zeros((2, 0, STEPS, 3, 3)), np.zeros((0, STEPS)))
 
 
 class Pair:
@@ -154,7 +154,7 @@ class Pair:
                 own,
                 NOTHING._replace(agreed=rows[None])
                 if agreed
-                else Others(own[None], other[None], np.full((1, STEPS), self.d), np.zeros(1, np.bool_)),
+                else Others(own[None], other[None], np.full((1, STEPS), self.d)),
                 SPARE,
                 upright=upright,
             )
