@@ -419,6 +419,20 @@ def test_a_statement_of_another_fleet_is_found_and_does_not_count() -> None:
     assert ("an agreement dropped", (11, 12)) in found(verdict)
 
 
+def test_all_statements_of_another_fleet_are_one_finding_of_their_sender() -> None:
+    """As in a recording of a version with other rules: it has their number, and the time of the first one."""
+    whole = swarm()
+    foreign = TERMS.fleet_identity.fingerprint + 256
+    for number in range(EPOCHS):
+        whole = changed(whole, 12, at(number), lambda one: one._replace(fingerprint=foreign))
+    own = [one for log in whole.logs if log.owner == 12 for one in log.statements if one.sender == 12]
+    times = [one.time for one in own if one.statement.fingerprint == foreign]
+    assert len(times) > 1
+    [finding] = [one for one in judge(whole).findings if one.what == "a statement of another fleet"]
+    assert (finding.who, finding.time) == ((12,), min(times))
+    assert finding.figures.endswith(f", {len(times)} times")
+
+
 def test_that_a_vehicle_is_away_changes_nothing() -> None:
     told = Told((11, 12), TERMS)
     plans = {11: aside(A), 12: aside(B)}

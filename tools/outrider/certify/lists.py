@@ -180,6 +180,7 @@ def listings(
     }
     findings: list[Finding] = []
     farewell: int | None = None
+    elsewhere: dict[int, list[int]] = {}
     reach = terms.reach
     ranges = None if reach is None else Ranges(history, others, terms, reach)
     reservations = Reservations(history, terms, ranges)
@@ -198,10 +199,8 @@ def listings(
             continue
         statement = record.statement
         if statement.fingerprint != terms.fleet_identity.fingerprint:
-            what = "a statement of another fleet"
-            fleet = terms.fleet_identity.fingerprint
-            figures = f"fingerprint {statement.fingerprint:08x}, the fleet's is {fleet:08x}"
-            findings += [Finding(what, (owner,), record.time, figures)] * (sender == owner)
+            if sender == owner:
+                elsewhere.setdefault(statement.fingerprint, []).append(record.time)
         elif statement.away:
             continue
         elif sender != owner:
@@ -247,4 +246,8 @@ def listings(
                     findings.append(Finding("a plan without an agreement", (owner, system), epoch, figures))
         elif unnamed:
             findings.append(Finding("a plan without a statement", (owner, *unnamed), epoch, ""))
+    what, fleet = "a statement of another fleet", terms.fleet_identity.fingerprint
+    for fingerprint, times in elsewhere.items():
+        figures = f"fingerprint {fingerprint:08x}, the fleet's is {fleet:08x}, {len(times)} times"
+        findings.append(Finding(what, (owner,), times[0], figures))
     return [one for peer in peers.values() for one in peer.listings.values()], findings
