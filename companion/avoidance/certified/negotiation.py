@@ -14,7 +14,7 @@ from collections.abc import Callable
 from math import inf
 from typing import NamedTuple
 
-from companion.avoidance.certified.agreed_planes import Rows, made, stacked
+from companion.avoidance.certified.agreed_planes import AgreedPlanes, Rows, made, stacked
 from companion.avoidance.certified.pair import Agreement
 from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan
@@ -86,14 +86,15 @@ class Negotiation:
                 if epoch - min(one) > _LATE_US:
                     refused = refused or one
                 continue
-            if self._taken_in_time(newest, one, plans) and self._unambiguous(peer, plans, one.epoch):
-                peer.agree(one, made(*plans, self._geometry.agreed))
+            planes = self._planes(peer, plans)
+            if self._taken_in_time(newest, planes) and self._unambiguous(peer, plans, one.epoch):
+                peer.agree(one, planes)
                 break
             refused = refused or one
         other, common = peer.plans.before(epoch), self._proposable(peer, newest, since)
-        if common is not None and self._worthwhile(now, peer, newest, common):
-            planes = made(*common, self._geometry.agreed)
-            peer.propose(now, Agreement(common.own.plan.epoch, common.other.plan.epoch), planes)
+        proposed = None if common is None else self._worthwhile(now, peer, newest, common)
+        if proposed is not None:
+            peer.propose(now, Agreement(proposed.own.plan.epoch, proposed.other.plan.epoch), proposed)
         elif refused is not None and pair.newer(refused, pair.considered):
             pair.refuse(refused)
             peer.changed = True
@@ -133,6 +134,13 @@ class Negotiation:
         own, other = self._plans.get(one.own), peer.plans.get(one.other)
         return None if own is None or other is None else AgreedPlans(own, other)
 
+    def _planes(self, peer: Peer, plans: AgreedPlans) -> AgreedPlanes:
+        """Return the planes of an agreement on these ``plans``: those that ``peer`` holds, or new ones."""
+        known = peer.agreed.get(Agreement(plans.own.plan.epoch, plans.other.plan.epoch))
+        if known is not None and known.own is plans.own and known.other is plans.other:
+            return known
+        return made(*plans, self._geometry.agreed)
+
     def current(self, peer: Peer, epoch: int) -> bool:
         """Return whether the only agreement is as good as one on the plans of ``epoch`` (µs)."""
         if len(peer.pair.kept) != 1:
@@ -140,31 +148,34 @@ class Negotiation:
         if peer.pair.kept[0] == (epoch, epoch):
             return True
         agreed, newest = self.plans_of(peer, peer.pair.kept[0]), self.plans_of(peer, Agreement(epoch, epoch))
-        return agreed is not None and newest is not None and self._same(agreed, newest)
+        return agreed is not None and newest is not None and self._same(peer, agreed, newest)
 
-    def _worthwhile(self, now: int, peer: Peer, newest: StoredPlan, plans: AgreedPlans) -> bool:
-        """Return whether an agreement on these ``plans`` is to be proposed.
+    def _worthwhile(
+        self, now: int, peer: Peer, newest: StoredPlan, plans: AgreedPlans
+    ) -> AgreedPlanes | None:
+        """Return the planes of an agreement on these ``plans`` if it is to be proposed, or None.
 
         The ``newest`` own plan must keep it, as where it is taken.
         """
         pair = peer.pair
         one = Agreement(plans.own.plan.epoch, plans.other.plan.epoch)
         if not pair.may_take(one) or len(pair.kept) >= _MOST_KEPT:
-            return False
+            return None
         if any(kept.epoch > one.epoch for kept in pair.kept):
             # The planes of an agreement say nothing of times before its later plan.
-            return False
+            return None
         if pair.kept:
             last = self.plans_of(peer, pair.kept[-1])
-            if last is not None and self._same(last, plans):
-                return False
+            if last is not None and self._same(peer, last, plans):
+                return None
         waiting = peer.waiting(now)
         if waiting is not None and waiting <= _OVERDUE * peer.round_trip:
-            return False
+            return None
         if not (self._apart(peer, plans) and self._reservable(newest, plans)):
-            return False
+            return None
+        planes = self._planes(peer, plans)
         # A plan keeps the agreements that it is part of.
-        return plans.own is newest or self._taken_in_time(newest, one, plans)
+        return planes if plans.own is newest or self._taken_in_time(newest, planes) else None
 
     def _reservable(self, newest: StoredPlan, plans: AgreedPlans) -> bool:
         """Return whether columns permit an agreement on these plans.
@@ -189,17 +200,20 @@ class Negotiation:
             self._clear[names] = known
         return known
 
-    def _taken_in_time(self, newest: StoredPlan, one: Agreement, plans: AgreedPlans) -> bool:
-        """Return whether the ``newest`` own plan, and the one that is flown until it begins, keep ``one``.
+    def _taken_in_time(self, newest: StoredPlan, planes: AgreedPlanes) -> bool:
+        """Return whether the ``newest`` own plan, and the one flown until it begins, keep an agreement.
 
         The peer may replan on this agreement alone, and by a clock that is behind.
         """
         epoch = newest.plan.epoch
-        if not (self._kept(newest, plans, epoch) and self._reservable(newest, plans)):
+        if not (
+            self._kept(newest, planes, epoch)
+            and self._reservable(newest, AgreedPlans(planes.own, planes.other))
+        ):
             return False
         flown = self._plans.before(epoch - 1)
-        begins = epoch if flown is None else max(flown.plan.epoch, one.epoch)
-        return flown is None or begins >= epoch or self._kept(flown, plans, begins)
+        begins = epoch if flown is None else max(flown.plan.epoch, planes.epoch)
+        return flown is None or begins >= epoch or self._kept(flown, planes, begins)
 
     def _apart(self, peer: Peer, plans: AgreedPlans) -> bool:
         """Return whether two plans are as far apart as the confirmed agreement demands.
@@ -214,8 +228,11 @@ class Negotiation:
         before = self.plans_of(peer, confirmed)
         if before is None:
             return False
-        own_keeps = plans.own is self._plans.newest or self._kept(plans.own, before, epoch)
-        return own_keeps and self._kept(plans.other, AgreedPlans(before.other, before.own), epoch)
+        if plans.own is not self._plans.newest and not self._kept(
+            plans.own, self._planes(peer, before), epoch
+        ):
+            return False
+        return self._kept(plans.other, made(before.other, before.own, self._geometry.agreed), epoch)
 
     def _unambiguous(self, peer: Peer, plans: AgreedPlans, epoch: int) -> bool:
         """Return whether two plans may be the first ones agreed on.
@@ -232,7 +249,7 @@ class Negotiation:
             plans.own.later(epoch, rows), plans.other.later(epoch, rows), plans.columns
         )
 
-    def _same(self, before: AgreedPlans, after: AgreedPlans) -> bool:
+    def _same(self, peer: Peer, before: AgreedPlans, after: AgreedPlans) -> bool:
         """Return whether both plans of an agreement are the earlier ones, carried on, and share the room so.
 
         Plans that have come to rest since then share it equally, whereas the one that flew behind had more.
@@ -250,18 +267,18 @@ class Negotiation:
             # Hovering vehicles come here in each step: their planes are not computed anew.
             return carried_on
         rows = stacked(
-            [made(*plans, self._geometry.agreed) for plans in (before, after)],
+            [self._planes(peer, plans) for plans in (before, after)],
             epoch,
             after.own.plan.dt,
             self._steps,
         )
         return float(abs(rows[0, :, SHARE] - rows[1, :, SHARE]).max()) <= _OTHER_SHARE
 
-    def _kept(self, plan: StoredPlan, plans: AgreedPlans, epoch: int) -> bool:
+    def _kept(self, plan: StoredPlan, planes: AgreedPlanes, epoch: int) -> bool:
         """Return whether ``plan`` keeps the planes of an agreement from ``epoch`` (µs) on, for ever.
 
-        ``plans``: first that of the vehicle of ``plan``. None of the plans begins later than ``epoch``, so
-        all rest in the last of the n + 1 segments.
+        ``planes``: those of the vehicle of ``plan``. None of the plans begins later than ``epoch``, so all
+        rest in the last of the n + 1 segments.
         """
-        rows = stacked([made(*plans, self._geometry.agreed)], epoch, plan.plan.dt, self._steps)
+        rows = stacked([planes], epoch, plan.plan.dt, self._steps)
         return keeps(plan.later(epoch, self._steps + 1), rows[0])

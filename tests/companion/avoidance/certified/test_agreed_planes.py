@@ -17,6 +17,7 @@ from companion.avoidance.certified.peer import Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan, stored
 from companion.avoidance.certified.separating_planes import Others, agreed_planes, planes
 from companion.errors import CompanionError
+from companion.values.horizon import Array
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS, random_plan
 
 LENGTH = DT
@@ -93,13 +94,8 @@ def test_they_come_before_those_of_pairs_that_share_nothing() -> None:
     assert found.normals[2, 0] @ (1.0, 0.0, 0.0) == pytest.approx(-1.0, abs=1e-2)
 
 
-@pytest.mark.parametrize(
-    ("shift", "epochs", "current"), [(0.75, 1, True), (0.75, 12, False), (0.0, 12, True)]
-)
-def test_an_agreement_of_the_flight_is_not_as_good_as_one_at_rest(
-    shift: float, epochs: int, current: bool
-) -> None:
-    """Of two that flew in a row and rest as planned the one ahead would have an eighth of the room."""
+def in_a_row(epochs: int) -> tuple[PlanFile, Peer]:
+    """The own plans and the peer: both fly east and are agreed on these plans, and carried them on since."""
     pushes = np.zeros((STEPS, 3))
     pushes[:5, 0], pushes[5:10, 0] = 2.0, -2.0
     files = PlanFile(), PlanFile()
@@ -107,8 +103,40 @@ def test_an_agreement_of_the_flight_is_not_as_good_as_one_at_rest(
         plan = committed(resting(EPOCH, DT, STEPS, (x, 0.0, 5.0), 7), pushes)
         for one in (plan, carried_on(plan, epochs)):
             file.add(stored(one))
-    distances = Distances(1.5, FURTHER, planar=True, shift=shift)
-    negotiation = Negotiation(files[0], STEPS, Geometry(distances.apart, distances.agreed))
     peer = Peer(1, 2)
     peer.plans, peer.pair.kept = files[1], (Agreement(EPOCH, EPOCH),)
+    return files[0], peer
+
+
+@pytest.mark.parametrize(
+    ("shift", "epochs", "current"), [(0.75, 1, True), (0.75, 12, False), (0.0, 12, True)]
+)
+def test_an_agreement_of_the_flight_is_not_as_good_as_one_at_rest(
+    shift: float, epochs: int, current: bool
+) -> None:
+    """Of two that flew in a row and rest as planned the one ahead would have an eighth of the room."""
+    distances = Distances(1.5, FURTHER, planar=True, shift=shift)
+    own, peer = in_a_row(epochs)
+    negotiation = Negotiation(own, STEPS, Geometry(distances.apart, distances.agreed))
     assert negotiation.current(peer, EPOCH + epochs * DT) is current
+
+
+def test_planes_that_are_held_are_not_computed_anew() -> None:
+    """Of an agreement and the one that may replace it, only the latter's are."""
+    distances = Distances(1.5, FURTHER, planar=True, shift=0.75)
+    begun: list[Array] = []
+
+    def agreed(own: Array, other: Array, columns: int) -> Array:
+        begun.append(own[0, 0])
+        return distances.agreed(own, other, columns)
+
+    own, peer = in_a_row(1)
+    negotiation = Negotiation(own, STEPS, Geometry(distances.apart, agreed))
+    first, second = own.get(EPOCH), own.get(EPOCH + DT)
+    other = peer.plans.get(EPOCH)
+    assert first is not None
+    assert second is not None
+    assert other is not None
+    peer.agreed[Agreement(EPOCH, EPOCH)] = made(first, other, distances.agreed)
+    assert negotiation.current(peer, EPOCH + DT)
+    np.testing.assert_array_equal(begun, [second.controls[0, 0]])
