@@ -18,7 +18,7 @@ from sitl.estimation.profiles import PROFILES
 Milliseconds = Annotated[float, Field(ge=0.0, le=5_000.0)]
 Seconds = Annotated[float, Field(gt=0.0, le=120.0)]
 _KNOT_US = CertifiedConfig().dt_us
-_LONGEST_US = 2_000_000
+_LONGEST_US: int = CertifiedConfig.model_json_schema()["properties"]["epoch_us"]["maximum"]
 Few = Annotated[int, Field(ge=0, le=20)]
 
 
