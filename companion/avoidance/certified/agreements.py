@@ -282,16 +282,20 @@ class Agreements:
         It is the mean over the peers that were heard lately, without departed ones and those that
         another controller flies. None without such a peer, or if all are known for less time.
         """
-        shares = [
-            share
-            for peer in self._peers.values()
-            if peer.left is None
-            and not peer.away
-            and peer.last_received is not None
-            and now - peer.last_received <= _HEARD_US
-            and (share := peer.plans.share(self._config.epoch_us, count)) is not None
-        ]
+        epoch = self._config.epoch_us
+        known = (peer.plans.share(epoch, count) for peer in self._lately(now, _HEARD_US))
+        shares = [share for share in known if share is not None]
         return sum(shares) / len(shares) if shares else None
+
+    def _lately(self, now: int, within: int) -> Iterator[Peer]:
+        """Yield the peers of which a plan or statement was received ``within`` this time (µs) before ``now``.
+
+        Departed ones and those that another controller flies are not among them.
+        """
+        for peer in self._peers.values():
+            last = peer.last_received
+            if peer.left is None and not peer.away and last is not None and now - last <= within:
+                yield peer
 
     @property
     def away(self) -> frozenset[int]:
@@ -399,14 +403,8 @@ class Agreements:
         Vehicles that another controller flies, and those from which nothing was received for ``gone_us``, are
         not counted.
         """
-        return any(
-            peer.left is None
-            and not peer.away
-            and peer.last_received is not None
-            and now - peer.last_received <= self._config.gone_us
-            and not self._negotiation.current(peer, epoch)
-            for peer in self._peers.values()
-        )
+        lately = self._lately(now, self._config.gone_us)
+        return any(not self._negotiation.current(peer, epoch) for peer in lately)
 
     def agreed(self) -> list[AgreedPlanes]:
         """Return the planes of all agreements that are kept, in the order of system ids.

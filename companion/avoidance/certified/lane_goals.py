@@ -11,16 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.told_goals import REACHED_M, ToldGoals
 from companion.values.horizon import Array
 from companion.ways.subgoal import Subgoal
 from companion.ways.traveller import Traveller
 
 if TYPE_CHECKING:
     from companion.ways.way import Way
-
-_REACHED_M = 0.2
-"""Distance of the end of the plan from a goal that counts as reached, and by which a goal may move."""
 
 
 class LaneGoals:
@@ -45,11 +42,11 @@ class LaneGoals:
         """
         if not self._in_use:
             return None
-        if self._goal is None or float(np.abs(self._goal - destination).max()) > _REACHED_M:
+        if self._goal is None or float(np.abs(self._goal - destination).max()) > REACHED_M:
             self._reached = False
         self._goal = destination
         lanes = None if self._way is None else self._way.lanes()
-        self._reached |= float(np.abs(rest - destination).max()) < _REACHED_M or (
+        self._reached |= float(np.abs(rest - destination).max()) < REACHED_M or (
             lanes is not None and lanes.at_goal(rest, destination)
         )
         self._goals.tell(destination, reached=self._reached)

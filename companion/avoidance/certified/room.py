@@ -18,15 +18,13 @@ import numpy as np
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.free_place import covered, free_places
-from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.told_goals import REACHED_M, ToldGoals
 from companion.avoidance.certified.visibility_graph import Discs, free, without
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
 from companion.values.vectors import limit
 from mavlink_bridge.wire.goal import WireRoom, room_to
 
-_REACHED_M = 0.2
-"""Distance of the end of the plan from a goal that counts as reached, and by which a goal may move."""
 _WIDE, _KEPT = 1.1, 1.03
 """Half width of a corridor in least distances of plans: for a new place beside it, and for the place where a
 vehicle already stands."""
@@ -70,11 +68,11 @@ class Room:
         These are the corridors of those that ask. The plan of ``epoch`` (µs) ends at ``rest`` (3,), m.
         """
         before = self._aside
-        if self._goal is None or float(np.abs(self._goal - goal).max()) > _REACHED_M:
+        if self._goal is None or float(np.abs(self._goal - goal).max()) > REACHED_M:
             self._reached = self._asks = False
             self._rank, self._aside = 0, None
         self._goal = goal
-        self._there = float(np.abs(rest - goal).max()) < _REACHED_M
+        self._there = float(np.abs(rest - goal).max()) < REACHED_M
         self._reached |= self._there
         self._asks &= not self._there
         self._aside = self._place(now, epoch, rest, goal, agreements) if self._reached else None
@@ -121,7 +119,7 @@ class Room:
                     self._rank = first.room.rank + 1 if rank else 0
                     place = np.array([found[0], found[1], goal[2]])
                     aside = self._aside
-                    stays = aside is not None and float(np.abs(aside - place).max()) < _REACHED_M
+                    stays = aside is not None and float(np.abs(aside - place).max()) < REACHED_M
                     return aside if stays else place
         return self._aside
 

@@ -10,6 +10,8 @@ from companion.values.horizon import Array
 from mavlink_bridge.messages import Message, Source, Tunnel
 from mavlink_bridge.wire.goal import PAYLOAD_TYPE, WireGoal, WireRoom, goal_at, pack, unpack
 
+REACHED_M = 0.2
+"""Distance of the end of the plan from a goal that counts as reached, and by which a goal may move."""
 _VALID_US = 2_000_000
 """Time (µs) for which a goal is that of its vehicle; one that has none tells none."""
 
