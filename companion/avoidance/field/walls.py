@@ -11,7 +11,8 @@ Near the floor the field itself is turned: what pushes down pushes sideways (``a
 
 Stopping counts on 1/√3 of ``a_total`` at most, which a vehicle has on all axes at once, and never more than
 the larger of the bound of u in that direction and half of ``a_total``. A plan that begins beyond a wall is
-kept from going further.
+kept from going further. The first step of a plan and all steps of an amended axis keep a wall at all times,
+the other steps at the knots.
 """
 
 from __future__ import annotations
@@ -115,6 +116,10 @@ def _safe(room: float, v: float, a: float, fastest: float, braking: float, jerk:
     speed, left = v + dt * a, room - dt * (v + 0.5 * dt * a)
     growth = max(a * (a / jerk - dt), 0.0) / 2.0 if jerk > 0.0 and a > 0.0 else 0.0
     if speed + growth > fastest + _TOLERANCE:
+        return False
+    if v > 0.0 and speed < 0.0 and room + v * v / (2.0 * a) < -_TOLERANCE:
+        # It turns back within the step, after its nearest point. A plan that is replaced between two knots
+        # leaves a state with less room than at a knot, where a step that ends at the wall may turn beyond it.
         return False
     return left >= _stopping(speed, a, braking, jerk, dt) - _TOLERANCE
 
