@@ -114,7 +114,8 @@ class GuardConfig(Settings):
         ge=0.0,
         le=20.0,
         description="m: on the way back the vehicles fly so far above each other, in the order of their ids,"
-        " all of them above the distance that the target keeps; each climbs first",
+        " all of them above the distance that the target keeps; each climbs first; not with committed plans"
+        " that are planar, which keep their height",
     )
     near: Positive | None = Field(
         None,

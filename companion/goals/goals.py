@@ -98,6 +98,10 @@ class Goals:
         self._began: Array | None = None
         self._nearest, self._nearer_at = inf, 0
         self._lane, self._clearance = 0.0, self._above_target(system)
+        # Committed plans that are planar keep their height: a vehicle would never reach its lane. They keep
+        # the distances of the way back without lanes.
+        flat = config.planar and config.avoidance == "certified"
+        self._step = 0.0 if flat else config.guard.return_step
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self._floor = -inf
@@ -159,8 +163,7 @@ class Goals:
         ``bounds``: on the speed at the measured position; they go with the aim, and limit its distance, too.
         Raises SurfaceError if the function of a user's surface fails.
         """
-        step = self._config.guard.return_step
-        self._lane = step * smaller_ids + self._clearance if step else 0.0
+        self._lane = self._step * smaller_ids + self._clearance if self._step else 0.0
         aim = self._on_way(self._destination(now, view, measured, obstacles, mates, sight), measured)
         limit = self._config.guard.cautious_speed
         speed = inf if limit is None or not cautious else limit

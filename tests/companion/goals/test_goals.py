@@ -193,6 +193,27 @@ def test_a_vehicle_with_a_lane_climbs_to_it_before_it_sets_off() -> None:
     assert off(bench, (0.0, 0.0)) < 1.0
 
 
+@pytest.mark.parametrize("planar", [True, False])
+def test_committed_plans_return_at_their_height_if_planar_and_in_a_lane_otherwise(planar: bool) -> None:
+    """A vehicle whose plans keep their height would never reach a lane, and so never set off."""
+    bench = Bench(avoidance="certified", planar=planar, guard={"return_step": 3.0}).take_off()
+    height = float(bench.autopilot.position[2])
+    bench.go_to((15, 0, height))
+    received = bench.datagram("swarm", seen_at(SYSTEM - 1, (-30.0, 30.0, 5.0)))
+    bench.fly(12.0, received)
+    assert off(bench, (15.0, 0.0)) < 0.5
+    bench.order(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    highest = height
+    for _ in range(2_000):
+        bench.step(*([received] if bench.now % 100_000 == 0 else []))
+        if bench.phase is not Phase.RETURN:
+            break
+        highest = max(highest, float(bench.autopilot.position[2]))
+    assert bench.phase is Phase.SETTLE
+    assert off(bench, (0.0, 0.0)) < 0.6
+    assert highest < height + 0.1 if planar else highest > height + 3.0 - 1.1
+
+
 @pytest.mark.parametrize("east", [8.0, 10.0, 12.0])
 def test_the_target_pushes_no_vehicle_into_the_lane_above(east: float) -> None:
     """The way back of the lowest vehicle leads over the target, with the shipped settings."""
