@@ -127,8 +127,8 @@ def test_planes_are_upright_only_once_no_agreement_on_a_plan_in_space_is_kept() 
 
 
 def test_who_is_below_a_hovering_vehicle_waits_and_does_not_stop_it() -> None:
-    """It says for whom it waits."""
-    swarm = below(3_000_000)
+    """It says for whom it waits, as long as the other has not moved away."""
+    swarm = below(2_000_000)
     assert not swarm.vehicles[0].columns
     assert swarm.vehicles[0].flight.reservation.missing(0).startswith("room for its column: the plan of 2")
     assert any(made.found for made in swarm.vehicles[1].made)
