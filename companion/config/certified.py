@@ -220,7 +220,10 @@ class CertifiedConfig(Settings):
     omega_speed: Weight = Field(0.1, description="weight of its speeds")
     omega_input: Positive = Field(0.02, description="weight of a")
     omega_field: Weight = Field(0.3, description="weight of the field of those that share no plan")
-    omega_jerk: Weight = Field(0.2, description="weight of the change of a from step to step")
+    omega_jerk: Weight | None = Field(
+        None,
+        description="weight of the change of a from step to step; null: 0.25 in `planar` flights, or 0.2",
+    )
     spare: Positive = Field(0.01, description="m wanted beyond the least distance, for rounding")
     following: FollowingConfig = FollowingConfig()
     deadlock: DeadlockConfig = DeadlockConfig()
@@ -230,6 +233,13 @@ class CertifiedConfig(Settings):
     def knots(self) -> int:
         """Number of knots in an epoch."""
         return self.epoch_us // self.dt_us
+
+    def jerk_weight(self, *, planar: bool) -> float:
+        """Return ``omega_jerk``, or without it what suits flights in the plane, or in space."""
+        if self.omega_jerk is not None:
+            return self.omega_jerk
+        # Sixteen that brake as late as in space stop each other in the plane.
+        return 0.25 if planar else 0.2
 
     @model_validator(mode="after")
     def _epochs(self) -> CertifiedConfig:

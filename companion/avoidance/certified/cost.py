@@ -52,13 +52,14 @@ class Cost:
         """Derivative of the cost by a shift of the whole plan, one metre from all its preferred places."""
 
 
-def arriving(config: CertifiedConfig, S_x: Array, S_v: Array) -> Cost:
-    """Return the cost of a destination at rest."""
+def arriving(config: CertifiedConfig, S_x: Array, S_v: Array, *, planar: bool) -> Cost:
+    """Return the cost of a destination at rest, of a flight that is ``planar`` or in space."""
     n = len(S_x)
     places = np.full(n, config.omega_place)
     places[-1] = config.omega_end
     fields = np.full(n, config.omega_field)
-    return Cost(places, fields, config.omega_speed, config.omega_jerk, config.omega_input, S_x, S_v)
+    jerk = config.jerk_weight(planar=planar)
+    return Cost(places, fields, config.omega_speed, jerk, config.omega_input, S_x, S_v)
 
 
 def following(config: CertifiedConfig, S_x: Array, S_v: Array) -> Cost:

@@ -119,8 +119,8 @@ class SeparationQp:
         changes = np.eye(n) - np.eye(n, k=-1)
         self._maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x, self._S_v, changes])
         self.costs = {
-            moving: cost(config, self._S_x, self._S_v)
-            for moving, cost in ((False, arriving), (True, following))
+            False: arriving(config, self._S_x, self._S_v, planar=planar),
+            True: following(config, self._S_x, self._S_v),
         }
         self._effects = {moving: effects(cost.inverse, self._maps) for moving, cost in self.costs.items()}
         # Constant arguments of ``write_cost``.

@@ -236,3 +236,17 @@ def test_the_scenes_are_hard_ones() -> None:
     assert sum(widened(s).max() > 0.1 for s in scenes) > 30
     assert sum(bool((np.abs(room(s)) < 1e-12).any()) for s in scenes) > 10
     assert sum(np.linalg.norm(solved(s).forces) > 1e-3 for s in scenes) > 30
+
+
+@pytest.mark.parametrize(("planar", "weight"), [(True, 0.25), (False, 0.2)])
+def test_without_a_setting_the_weight_of_the_jerk_suits_the_plane_or_space(
+    planar: bool, weight: float
+) -> None:
+    """A setting holds for both."""
+    named = CONFIG.model_copy(update={"omega_jerk": weight})
+    other = CONFIG.model_copy(update={"omega_jerk": 2.0 * weight})
+    found, same, twice = (
+        SeparationQp(STEPS, WIDE, config, planar=planar).costs[False].P for config in (CONFIG, named, other)
+    )
+    assert (found == same).all()
+    assert (found != twice).any()
