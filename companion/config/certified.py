@@ -218,11 +218,13 @@ class CertifiedConfig(Settings):
     omega_end: Positive = Field(30.0, description="weight of where the plan comes to rest")
     omega_place: Weight = Field(0.3, description="weight of where it is after each step before")
     omega_speed: Weight = Field(0.1, description="weight of its speeds")
-    omega_input: Positive = Field(0.02, description="weight of a")
+    omega_input: Positive | None = Field(
+        None, description="weight of a; null: 0.05 in `planar` flights, or 0.02"
+    )
     omega_field: Weight = Field(0.3, description="weight of the field of those that share no plan")
     omega_jerk: Weight | None = Field(
         None,
-        description="weight of the change of a from step to step; null: 0.25 in `planar` flights, or 0.2",
+        description="weight of the change of a from step to step; null: 0.3 in `planar` flights, or 0.2",
     )
     spare: Positive = Field(0.01, description="m wanted beyond the least distance, for rounding")
     following: FollowingConfig = FollowingConfig()
@@ -234,12 +236,12 @@ class CertifiedConfig(Settings):
         """Number of knots in an epoch."""
         return self.epoch_us // self.dt_us
 
-    def jerk_weight(self, *, planar: bool) -> float:
-        """Return ``omega_jerk``, or without it what suits flights in the plane, or in space."""
-        if self.omega_jerk is not None:
-            return self.omega_jerk
-        # Sixteen that brake as late as in space stop each other in the plane.
-        return 0.25 if planar else 0.2
+    def effort(self, *, planar: bool) -> tuple[float, float]:
+        """Return ``omega_input`` and ``omega_jerk``, or without them what suits the plane, or space."""
+        # In the plane many that brake late stop each other.
+        a, jerk = (0.05, 0.3) if planar else (0.02, 0.2)
+        chosen_a, chosen_jerk = self.omega_input, self.omega_jerk
+        return (a if chosen_a is None else chosen_a, jerk if chosen_jerk is None else chosen_jerk)
 
     @model_validator(mode="after")
     def _epochs(self) -> CertifiedConfig:

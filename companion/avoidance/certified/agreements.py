@@ -343,6 +343,7 @@ class Agreements:
         """Return the mean age (s), at ``now`` (µs), of the plans on which room beside ``systems`` rests.
 
         Of a vehicle that is the oldest plan in an agreement that is kept; without any it does not count.
+        Agreements of vehicles that rest are not renewed, so at the beginning of a flight they are old.
         """
         kept = self.kept()
         oldest = [min(map(min, kept[system])) for system in systems if kept.get(system)]

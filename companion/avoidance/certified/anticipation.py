@@ -25,9 +25,10 @@ planes lead vehicles over each other, which is shorter than a circle: so it is f
 
 A circle that reaches beyond the goal does not fit: the vehicle would fly round further out than it has to go.
 So if ``room`` · min(1, Σ w) · K D / 2π exceeds the distance from the mean place of the encounters to the
-goal, with the D of new agreements, nothing is anticipated, and the deadlock rule (``DeadlockTurn``) resolves
-the encounter. With that of old ones the circle is at most as large as this distance. On the approach
-this distance stays as it is. K falls while vehicles pass; one that began to anticipate among them, when a
+goal, nothing is anticipated, and the deadlock rule (``DeadlockTurn``) resolves the encounter. The factor D of
+this circle is the one without the growth; Σ w and K are those with it, so a crowd for which there is just
+room with new agreements may have none with old ones. The circle that is flown is at most as large as this
+distance. On the approach this distance stays as it is. K falls while vehicles pass; one that began to anticipate among them, when a
 smaller circle fits, would have to pass those that are pushed already. So the decision stays until nobody is
 met, or the goal is another one.
 
@@ -129,8 +130,8 @@ def anticipated(
 
     ``least`` (m): the least distance of plans. ``speed`` (m/s) and ``acceleration`` (m/s²): the largest ones
     of the own plans. ``own`` (2, 3), m: where the own plan begins, and the goal. ``others`` (M, 2, 3), m:
-    where the other vehicles are then, and their goals. ``late`` (s): by how much agreements come later than
-    in time. BEYOND: they need a circle that does not fit.
+    where the other vehicles are then, and their goals. ``late`` (s): age of agreements beyond two epochs, two
+    epochs at most. BEYOND: they need a circle that does not fit.
     """
     place, goal = own.tolist()
     way, x, y = _direction(place, goal)

@@ -58,12 +58,12 @@ def arriving(config: CertifiedConfig, S_x: Array, S_v: Array, *, planar: bool) -
     places = np.full(n, config.omega_place)
     places[-1] = config.omega_end
     fields = np.full(n, config.omega_field)
-    jerk = config.jerk_weight(planar=planar)
-    return Cost(places, fields, config.omega_speed, jerk, config.omega_input, S_x, S_v)
+    a, jerk = config.effort(planar=planar)
+    return Cost(places, fields, config.omega_speed, jerk, a, S_x, S_v)
 
 
-def following(config: CertifiedConfig, S_x: Array, S_v: Array) -> Cost:
-    """Return the cost of a destination that moves.
+def following(config: CertifiedConfig, S_x: Array, S_v: Array, *, planar: bool) -> Cost:
+    """Return the cost of a destination that moves, of a flight that is ``planar`` or in space.
 
     The field moves the places as far as that of a destination at rest moves the places before the end.
     """
@@ -71,4 +71,5 @@ def following(config: CertifiedConfig, S_x: Array, S_v: Array) -> Cost:
     places = weights.omega_place * np.exp(-weights.decay * dt * np.arange(n))
     places[-1] += weights.omega_end
     fields = places * config.omega_field / max(config.omega_place, 1e-6)
-    return Cost(places, fields, weights.omega_speed, weights.omega_jerk, config.omega_input, S_x, S_v)
+    a, _ = config.effort(planar=planar)
+    return Cost(places, fields, weights.omega_speed, weights.omega_jerk, a, S_x, S_v)

@@ -120,7 +120,7 @@ class SeparationQp:
         self._maps: Array = np.stack([x, x + 0.5 * dt * v, self._S_x, self._S_v, changes])
         self.costs = {
             False: arriving(config, self._S_x, self._S_v, planar=planar),
-            True: following(config, self._S_x, self._S_v),
+            True: following(config, self._S_x, self._S_v, planar=planar),
         }
         self._effects = {moving: effects(cost.inverse, self._maps) for moving, cost in self.costs.items()}
         # Constant arguments of ``write_cost``.

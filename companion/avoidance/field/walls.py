@@ -12,7 +12,7 @@ Near the floor the field itself is turned: what pushes down pushes sideways (``a
 Stopping counts on 1/√3 of ``a_total`` at most, which a vehicle has on all axes at once, and never more than
 the larger of the bound of u in that direction and half of ``a_total``. A plan that begins beyond a wall is
 kept from going further. The first step of a plan and all steps of an amended axis keep a wall at all times,
-the other steps at the knots.
+as far as braking allows, the other steps at the knots.
 """
 
 from __future__ import annotations

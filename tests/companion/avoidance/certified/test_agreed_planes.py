@@ -140,3 +140,8 @@ def test_planes_that_are_held_are_not_computed_anew() -> None:
     peer.agreed[Agreement(EPOCH, EPOCH)] = made(first, other, distances.agreed)
     assert negotiation.current(peer, EPOCH + DT)
     np.testing.assert_array_equal(begun, [second.controls[0, 0]])
+    # Planes of other plans with the same epochs, as of before a vehicle began anew, are not used.
+    begun.clear()
+    peer.agreed[Agreement(EPOCH, EPOCH)] = made(second, other, distances.agreed)
+    assert negotiation.current(peer, EPOCH + DT)
+    np.testing.assert_array_equal(begun, [first.controls[0, 0], second.controls[0, 0]])

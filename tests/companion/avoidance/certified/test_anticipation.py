@@ -182,14 +182,14 @@ def test_the_older_the_agreements_the_larger_the_circle(one: float, two: float) 
     young, old = sorted((one, two))
     assert at_age(young, others).angle <= at_age(old, others).angle
     assert at_age(min(young, 0.4), others) == at_age(0.0, others)
-    assert at_age(0.8 + old, others).angle == at_age(0.8, others).angle
+    assert at_age(0.8 + old, others).angle == at_age(0.8, others).angle > at_age(0.4, others).angle
     late = min(max(old - 0.4, 0.0), 0.4)
     apart = 2.0 * 8.0 * np.sin(at_age(old, others).angle) * np.sin(np.pi / 4)
     assert apart >= LEAST * (1.0 + CONFIG.wide_late * late)
 
 
 def test_the_circle_of_old_agreements_does_not_reach_beyond_the_goals() -> None:
-    """It is at most as large as that; so who has new agreements and who has old ones both anticipate."""
+    """It is at most as large as that: here all anticipate, with new agreements and with old ones."""
     crowd = ring(10)[1:]
     new, old = at_age(0.0, crowd), at_age(0.8, crowd)
     assert new != NOBODY != old
