@@ -28,9 +28,9 @@ So if ``room`` · min(1, Σ w) · K D / 2π exceeds the distance from the mean p
 goal, nothing is anticipated, and the deadlock rule (``DeadlockTurn``) resolves the encounter. The factor D of
 this circle is the one without the growth; Σ w and K are those with it, so a crowd for which there is just
 room with new agreements may have none with old ones. The circle that is flown is at most as large as this
-distance. On the approach this distance stays as it is. K falls while vehicles pass; one that began to anticipate among them, when a
-smaller circle fits, would have to pass those that are pushed already. So the decision stays until nobody is
-met, or the goal is another one.
+distance. On the approach this distance stays as it is. K falls while vehicles pass; one that began to
+anticipate among them, when a smaller circle fits, would have to pass those that are pushed already. So the
+decision stays until nobody is met, or the goal is another one.
 
 Three kinds of encounters do not count: beyond one of the goals; one that passes more than ``wrong_side`` · D
 on the side of the turn, because it would have to be crossed; and, by as much as it flies to the side of the

@@ -46,11 +46,12 @@ _TRAVEL_M = 1.0
 class Others(NamedTuple):
     """What a new plan keeps to: A agreements, M pairs of plans, and B boxes.
 
-    The own side keeps the whole distance of a pair. ``own`` and ``controls`` (M, n, 3, 3), m: control points of the own plan and of the other plan of each
-    pair, on the committed plan's knots. ``distance`` (M, n), m: least distance on each segment. ``heights``
-    (M,): 1/w, by which differences in height are multiplied; None: 1. ``boxes``: to keep ``from_boxes`` (m)
-    from; None: none. ``agreed`` (A, n + 1, 13), m: rows of ``agreed_planes`` from the beginning of the
-    committed plan on, of agreements, whose other side keeps its own share; None: none.
+    The own side keeps the whole distance of a pair. ``own`` and ``controls`` (M, n, 3, 3), m: control points
+    of the own plan and of the other plan of each pair, on the committed plan's knots. ``distance`` (M, n), m:
+    least distance on each segment. ``heights`` (M,): 1/w, by which differences in height are multiplied;
+    None: 1. ``boxes``: to keep ``from_boxes`` (m) from; None: none. ``agreed`` (A, n + 1, 13), m: rows of
+    ``agreed_planes`` from the beginning of the committed plan on, of agreements, whose other side keeps its
+    own share; None: none.
     """
 
     own: Array
