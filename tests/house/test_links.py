@@ -1,4 +1,4 @@
-"""Links in README and the documents lead to files and headings that are there."""
+"""Links in README and the documents, and pages named in the code, lead to files and headings that are there."""
 
 from __future__ import annotations
 
@@ -15,6 +15,13 @@ PAGES = sorted(
     for path in (ROOT / folder).glob("*.md")
 )
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
+_CODE = [
+    path
+    for folder in ("companion", "config", "examples", "mavlink_bridge", "sitl", "tests", "tools")
+    for path in sorted((ROOT / folder).rglob("*"))
+    if path.suffix in {".html", ".js", ".json", ".py", ".pyi", ".sh", ".toml", ".yaml"}
+]
+_NAMED = re.compile(r"\bdocs/([\w/-]+\.md)(?:#([\w-]+))?")
 
 
 def anchors(page: Path) -> set[str]:
@@ -37,6 +44,19 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert target.exists(), f"{page.name}: {link}"
         if anchor and target.suffix == ".md":
             assert anchor in anchors(target), f"{page.name}: {link}"
+
+
+def test_pages_that_the_code_names_are_there() -> None:
+    named = {
+        (*match, str(path.relative_to(ROOT)))
+        for path in _CODE
+        for match in _NAMED.findall(path.read_text(encoding="utf-8", errors="replace"))
+    }
+    assert len(named) > 10
+    for page, anchor, path in sorted(named):
+        assert (ROOT / "docs" / page).exists(), f"{path}: {page}"
+        if anchor:
+            assert anchor in anchors(ROOT / "docs" / page), f"{path}: {page}#{anchor}"
 
 
 def test_every_picture_is_shown_by_a_page() -> None:

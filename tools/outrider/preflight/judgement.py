@@ -27,7 +27,7 @@ from outrider.scenarios.fleet_file import (
 from outrider.scenarios.fly_config import FleetOrigin
 
 _MOST_LOSS: Final = 0.6
-"""Loss up to which flights were measured to converge in time (docs/certified-figures.md)."""
+"""Loss up to which flights were measured to converge in time (docs/certified-figures.md#antipodal-scenes)."""
 _CLOCK_ROOM: Final = 1.25
 """Factor between the measured bound of a clock and the one that the fleet file allows."""
 _CLOCK_STEP_US: Final = 1_000

@@ -20,7 +20,7 @@ TUBE: Final = ("certified", "tube")
 _EXERCISED: Final = 0.8
 """Share of ``limits.u_max`` that the set-points of a flight must reach, for its tracking error to count."""
 _IN_WIND: Final = "simulated: 0.1 m in calm air, in 5 m/s of wind 0.8 m (ArduPilot) and 2.1 m (PX4)"
-"""Drifts of emulated autopilots (docs/certified-figures.md)."""
+"""Drifts of emulated autopilots (docs/certified-figures.md#take-off-and-landing)."""
 _SHORT_TIMEOUT_S: Final = 0.5
 """Time-out (s) up to which a vehicle without set-points is still near its plan."""
 
