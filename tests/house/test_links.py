@@ -1,4 +1,4 @@
-"""Links in README and the documents, and pages named in the code, lead to files and headings that are there."""
+"""Links of README and the documents, and pages that the code names, lead to files and headings there."""
 
 from __future__ import annotations
 
