@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import socket
 import sys
 
@@ -17,8 +18,10 @@ FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 
 
 def program(path, text):
+    """A Python program. No kernel starts an interpreter whose path is long or has spaces; a shell does."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(f"#!{sys.executable}\n{text}\n", encoding="utf-8")
+    start = f"#!/bin/sh\n'''exec' {shlex.quote(sys.executable)} \"$0\" \"$@\"\n' '''"
+    path.write_text(f"{start}\n{text}\n", encoding="utf-8")
     path.chmod(0o755)
     return path
 

@@ -105,7 +105,7 @@ def test_other_peoples_reader_finds_nothing_bad_in_our_logs(run_dir: Path) -> No
     tool = Path(sys.executable).with_name("mavlogdump.py")
     for system in (11, 12):
         log = run_dir / f"vehicle-{system}.tlog"
-        dump = subprocess.run([tool, log], capture_output=True, text=True, check=True)
+        dump = subprocess.run([sys.executable, tool, log], capture_output=True, text=True, check=True)
         lines = dump.stdout.splitlines()
         assert len(lines) == sum(1 for _ in read_tlog(log))
         assert not [line for line in lines if "BAD_DATA" in line or "UNKNOWN" in line]
