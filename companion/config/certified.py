@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -118,6 +118,19 @@ class TimeSourcesConfig(Settings):
     wrong: int = Field(
         1, ge=0, le=100, description="number of wrong sources that are tolerated; always a minority"
     )
+
+
+class FlightSettings(NamedTuple):
+    """Settings of ``CertifiedConfig`` whose defaults differ between flights in the plane and in space."""
+
+    omega_input: float
+    omega_jerk: float
+    plane_shift: float
+
+
+# In the plane many that brake late stop each other.
+_IN_PLANE = FlightSettings(omega_input=0.05, omega_jerk=0.3, plane_shift=0.75)
+_IN_SPACE = FlightSettings(omega_input=0.02, omega_jerk=0.2, plane_shift=0.0)
 
 
 class CertifiedConfig(Settings):
@@ -236,12 +249,11 @@ class CertifiedConfig(Settings):
         """Number of knots in an epoch."""
         return self.epoch_us // self.dt_us
 
-    def effort(self, *, planar: bool) -> tuple[float, float]:
-        """Return ``omega_input`` and ``omega_jerk``, or without them what suits the plane, or space."""
-        # In the plane many that brake late stop each other.
-        a, jerk = (0.05, 0.3) if planar else (0.02, 0.2)
-        chosen_a, chosen_jerk = self.omega_input, self.omega_jerk
-        return (a if chosen_a is None else chosen_a, jerk if chosen_jerk is None else chosen_jerk)
+    def for_flight(self, *, planar: bool) -> FlightSettings:
+        """Return the chosen settings; in place of those that are null what suits the plane, or space."""
+        defaults = _IN_PLANE if planar else _IN_SPACE
+        chosen = {name: getattr(self, name) for name in FlightSettings._fields}
+        return defaults._replace(**{name: value for name, value in chosen.items() if value is not None})
 
     @model_validator(mode="after")
     def _epochs(self) -> CertifiedConfig:

@@ -64,10 +64,6 @@ class OwnSurface(Settings):
     surface: SurfaceConfig = Field(description="surface around the target for this vehicle")
 
 
-_PLANE_SHIFT = 0.75
-"""``certified.plane_shift`` of flights in the plane."""
-
-
 class CompanionConfig(Settings):
     """All settings of one companion, except its links."""
 
@@ -155,9 +151,18 @@ class CompanionConfig(Settings):
     @property
     def plane_shift(self) -> float:
         """``certified.plane_shift``; without it the one that suits flights in the plane, or in space."""
-        chosen = self.certified.plane_shift
         # Rounded as in the fingerprint, so that all vehicles of a fleet have the same number.
-        return round(chosen if chosen is not None else _PLANE_SHIFT if self.planar else 0.0, 6)
+        return round(self.certified.for_flight(planar=self.planar).plane_shift, 6)
+
+    @property
+    def committed_in_plane(self) -> bool:
+        """Whether plans are committed and keep their height."""
+        return self.planar and self.avoidance == "certified"
+
+    @property
+    def return_step(self) -> float:
+        """``guard.return_step``, m; 0 for committed plans in the plane, which would never reach a lane."""
+        return 0.0 if self.committed_in_plane else self.guard.return_step
 
     @property
     def shares_surface(self) -> bool:
@@ -180,8 +185,7 @@ class CompanionConfig(Settings):
         for name in ("tangential", "approach_angle"):
             if name in self.methods and getattr(self, name).force_max <= max(self.limits.strongest):
                 raise ValueError(f"{name}.force_max must exceed u_max, or the input cancels it")
-        committed = self.avoidance == "certified" and self.planar
-        if self.way is not None and self.way.lanes is not None and not committed:
+        if self.way is not None and self.way.lanes is not None and not self.committed_in_plane:
             raise ValueError("way.lanes: allowed only with avoidance: certified and planar: true")
         if len(set(self.methods)) != len(self.methods):
             raise ValueError("methods: a method is there twice; allowed: once")

@@ -98,10 +98,7 @@ class Goals:
         self._began: Array | None = None
         self._nearest, self._nearer_at = inf, 0
         self._lane, self._clearance = 0.0, self._above_target(system)
-        # Committed plans that are planar keep their height: a vehicle would never reach its lane. They keep
-        # the distances of the way back without lanes.
-        flat = config.planar and config.avoidance == "certified"
-        self._step = 0.0 if flat else config.guard.return_step
+        self._step = config.return_step
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self._floor = -inf

@@ -122,7 +122,7 @@ class Planning:
             obstacles = self._world.obstacles(now, view, here)
         try:
             mates = self._world.neighbours.mates(now) if self._config.shares_surface else _NO_MATES
-            below = self._world.neighbours.below if self._config.guard.return_step else 0
+            below = self._world.neighbours.below if self._config.return_step else 0
             sight = _NO_SIGHT
             if isinstance(self._config.formation, Perception):
                 sight = self._world.sight(now, self._avoidance.lookahead_s)

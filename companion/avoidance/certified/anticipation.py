@@ -42,6 +42,7 @@ from __future__ import annotations
 from math import atan2, copysign, dist, hypot, inf, pi
 from typing import NamedTuple
 
+from companion.config import CompanionConfig
 from companion.config.certified import AnticipationConfig
 from companion.values.horizon import Array
 
@@ -50,6 +51,14 @@ _AT_GOAL_M = 0.5
 _LEAST_WAY_M = 0.5
 _IN_TIME = 2.0
 """Age (epochs) of the plans of agreements up to which vehicles need no more room than with new ones."""
+
+
+class Limits(NamedTuple):
+    """Least distance of plans (m), and the largest speed (m/s) and acceleration (m/s²) of the own plans."""
+
+    least: float
+    speed: float
+    acceleration: float
 
 
 class Anticipated(NamedTuple):
@@ -72,21 +81,14 @@ BEYOND = Anticipated(0.0, inf, fits=False)
 class Anticipation:
     """Turns of one vehicle among several; those whose circle does not fit are left to the deadlock rule.
 
-    ``epoch`` (s): of the plans. The other arguments are those of ``anticipated``.
+    ``least`` (m): the least distance of plans. ``sense``: the side of the turns, +1 right.
     """
 
-    def __init__(
-        self,
-        config: AnticipationConfig,
-        least: float,
-        speed: float,
-        acceleration: float,
-        sense: float,
-        epoch: float,
-    ) -> None:
-        self._config, self._least, self._sense = config, least, sense
-        self._speed, self._acceleration = speed, acceleration
-        self._in_time = _IN_TIME * epoch
+    def __init__(self, config: CompanionConfig, least: float, sense: float) -> None:
+        certified, limits = config.certified, config.limits
+        self._config, self._sense = certified.anticipation, sense
+        self._limits = Limits(least, min(limits.v_max[:2]), min(limits.u_max[:2]))
+        self._in_time = _IN_TIME * 1e-6 * certified.epoch_us
         self.restart()
 
     def restart(self) -> None:
@@ -101,9 +103,8 @@ class Anticipation:
         NOBODY before several are met, and from when a circle does not fit, until nobody is met or the goal is
         another one.
         """
-        limits = self._speed, self._acceleration
         late = min(max(age - self._in_time, 0.0), self._in_time)
-        found = anticipated(self._config, self._least, *limits, own, others, sense=self._sense, late=late)
+        found = anticipated(self._config, self._limits, own, others, sense=self._sense, late=late)
         goal = own[1].tolist()
         if found == NOBODY or self._goal is None or dist(self._goal, goal) > _AT_GOAL_M:
             self.restart()
@@ -117,9 +118,7 @@ class Anticipation:
 
 def anticipated(
     config: AnticipationConfig,
-    least: float,
-    speed: float,
-    acceleration: float,
+    limits: Limits,
     own: Array,
     others: Array,
     *,
@@ -128,11 +127,11 @@ def anticipated(
 ) -> Anticipated:
     """Return how to avoid encounters by a turn to the side of ``sense``: +1 right.
 
-    ``least`` (m): the least distance of plans. ``speed`` (m/s) and ``acceleration`` (m/s²): the largest ones
-    of the own plans. ``own`` (2, 3), m: where the own plan begins, and the goal. ``others`` (M, 2, 3), m:
-    where the other vehicles are then, and their goals. ``late`` (s): age of agreements beyond two epochs, two
-    epochs at most. BEYOND: they need a circle that does not fit.
+    ``own`` (2, 3), m: where the own plan begins, and the goal. ``others`` (M, 2, 3), m: where the other
+    vehicles are then, and their goals. ``late`` (s): age of agreements beyond two epochs, two epochs at most.
+    BEYOND: they need a circle that does not fit.
     """
+    least, speed, acceleration = limits
     place, goal = own.tolist()
     way, x, y = _direction(place, goal)
     if way < _AT_GOAL_M:

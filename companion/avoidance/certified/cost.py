@@ -58,8 +58,8 @@ def arriving(config: CertifiedConfig, S_x: Array, S_v: Array, *, planar: bool) -
     places = np.full(n, config.omega_place)
     places[-1] = config.omega_end
     fields = np.full(n, config.omega_field)
-    a, jerk = config.effort(planar=planar)
-    return Cost(places, fields, config.omega_speed, jerk, a, S_x, S_v)
+    chosen = config.for_flight(planar=planar)
+    return Cost(places, fields, config.omega_speed, chosen.omega_jerk, chosen.omega_input, S_x, S_v)
 
 
 def following(config: CertifiedConfig, S_x: Array, S_v: Array, *, planar: bool) -> Cost:
@@ -71,5 +71,5 @@ def following(config: CertifiedConfig, S_x: Array, S_v: Array, *, planar: bool) 
     places = weights.omega_place * np.exp(-weights.decay * dt * np.arange(n))
     places[-1] += weights.omega_end
     fields = places * config.omega_field / max(config.omega_place, 1e-6)
-    a, _ = config.effort(planar=planar)
-    return Cost(places, fields, weights.omega_speed, weights.omega_jerk, a, S_x, S_v)
+    omega_input = config.for_flight(planar=planar).omega_input
+    return Cost(places, fields, weights.omega_speed, weights.omega_jerk, omega_input, S_x, S_v)

@@ -68,8 +68,7 @@ class PlanGoals:
         self._space: SpaceDetour | None = None
         self._has_space = self._way is None and not config.planar
         self._least = least
-        fastest, epoch = (min(limits.v_max[:2]), min(limits.u_max[:2])), 1e-6 * certified.epoch_us
-        self._anticipation = Anticipation(certified.anticipation, sources.between, *fastest, sense, epoch)
+        self._anticipation = Anticipation(config, sources.between, sense)
         in_lanes = config.way is not None and config.way.lanes is not None
         # In space vehicles pass over each other, in lanes they give way.
         self._anticipates = config.planar and certified.anticipation.most > 0.0 and not in_lanes

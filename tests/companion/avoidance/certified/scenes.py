@@ -112,8 +112,8 @@ def residuals(scene: Scene, wish: Objective, accelerations: Array) -> Array:
     squares."""
     points, velocities = flown(scene, accelerations)
     weights, settings = np.full((STEPS, 1), CONFIG.omega_place), CONFIG.following if wish.moving else CONFIG
-    effort, jerk = CONFIG.effort(planar=False)
-    jerk = CONFIG.following.omega_jerk if wish.moving else jerk
+    in_space = CONFIG.for_flight(planar=False)
+    jerk = CONFIG.following.omega_jerk if wish.moving else in_space.omega_jerk
     weights[-1] = CONFIG.omega_end
     # −2 Ω f·x as part of the square: it is the place that is elsewhere.
     moved = CONFIG.omega_field * wish.field / weights
@@ -126,7 +126,7 @@ def residuals(scene: Scene, wish: Objective, accelerations: Array) -> Array:
     parts = (
         np.sqrt(weights) * (points[:, 2] - wish.places - moved),
         sqrt(settings.omega_speed) * (velocities - wish.velocities),
-        sqrt(effort) * accelerations,
+        sqrt(in_space.omega_input) * accelerations,
         sqrt(jerk) * change,
     )
     return np.concatenate([part.ravel() for part in parts])

@@ -11,7 +11,14 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.anticipation import BEYOND, NOBODY, Anticipated, Anticipation, anticipated
+from companion.avoidance.certified.anticipation import (
+    BEYOND,
+    NOBODY,
+    Anticipated,
+    Anticipation,
+    Limits,
+    anticipated,
+)
 from companion.config import CompanionConfig
 from companion.config.certified import AnticipationConfig
 from companion.values.bearings import turned
@@ -22,16 +29,20 @@ from tests.companion.avoidance.certified.swarm import FLEET, Habits, Rough, Swar
 
 CONFIG = AnticipationConfig()
 LEAST, SPEED, ACCELERATION = 1.25, 5.0, 2.0
-LIMITS = LEAST, SPEED, ACCELERATION
-AN_EPOCH, NEW = 0.2, 0.0
-"""Length of an epoch and age of new agreements, s."""
+LIMITS = Limits(LEAST, SPEED, ACCELERATION)
+WHOLE_CONFIG = CompanionConfig(
+    limits={"v_max": (SPEED,) * 3, "u_max": (ACCELERATION,) * 3},
+    certified={"dt_us": 200_000, "epoch_us": 200_000},
+)
+NEW = 0.0
+"""Age of new agreements, s."""
 OWN = np.array([[-8.0, 0.0, 5.0], [8.0, 0.0, 5.0]])
 places = st.floats(-12.0, 12.0).map(lambda x: round(x, 3))
 points = st.tuples(places, places, st.just(5.0))
 
 
 def found(others: Array, config: AnticipationConfig = CONFIG, sense: float = 1.0) -> Anticipated:
-    return anticipated(config, *LIMITS, OWN, others, sense=sense)
+    return anticipated(config, LIMITS, OWN, others, sense=sense)
 
 
 def straight(place: tuple[float, float], goal: tuple[float, float], height: float = 5.0) -> Array:
@@ -51,14 +62,14 @@ ONCOMING = straight((6.0, 0.0), (-8.0, 0.0))
 def test_two_that_meet_head_on_both_make_room() -> None:
     """Both turn by the same angle, by which together they pass further apart than plans must be."""
     mine = found(ONCOMING)
-    theirs = anticipated(CONFIG, *LIMITS, ONCOMING[0], OWN[None], sense=1.0)
+    theirs = anticipated(CONFIG, LIMITS, ONCOMING[0], OWN[None], sense=1.0)
     assert mine.angle == pytest.approx(theirs.angle)
     assert 2.0 * 7.0 * np.tan(mine.angle) >= LEAST
     assert mine.ahead == CONFIG.reach * SPEED
 
 
 def test_a_vehicle_that_brakes_slowly_still_reaches_its_largest_speed() -> None:
-    slow = anticipated(CONFIG, LEAST, SPEED, 0.5, OWN, ONCOMING, sense=1.0)
+    slow = anticipated(CONFIG, Limits(LEAST, SPEED, 0.5), OWN, ONCOMING, sense=1.0)
     assert slow.ahead == 0.5 * SPEED**2 / 0.5 > CONFIG.reach * SPEED
 
 
@@ -67,7 +78,7 @@ def test_vehicles_that_meet_in_one_place_pass_on_a_circle_with_room_for_all(coun
     """Places that far beside the meeting place, one of each vehicle, are as far apart as plans must be."""
     all_ways = ring(count)
     turns = [
-        anticipated(CONFIG, *LIMITS, all_ways[k], np.delete(all_ways, k, axis=0), sense=1.0).angle
+        anticipated(CONFIG, LIMITS, all_ways[k], np.delete(all_ways, k, axis=0), sense=1.0).angle
         for k in range(count)
     ]
     assert turns == pytest.approx([turns[0]] * count)
@@ -109,7 +120,7 @@ def test_directions_of_the_axes_do_not_count(angle: float) -> None:
     def seen(rows: Array) -> Array:
         return np.array([turned(row, angle) for row in rows.reshape(-1, 3)]).reshape(rows.shape)
 
-    here = anticipated(CONFIG, *LIMITS, seen(OWN), seen(ONCOMING), sense=1.0)
+    here = anticipated(CONFIG, LIMITS, seen(OWN), seen(ONCOMING), sense=1.0)
     assert here.angle == pytest.approx(found(ONCOMING).angle, abs=1e-6)
 
 
@@ -130,7 +141,7 @@ def test_a_circle_fits_where_it_does_not_reach_beyond_the_goals(
 
     def mine(room: float) -> Anticipated:
         config = CONFIG.model_copy(update={"room": room})
-        return anticipated(config, *LIMITS, ways[0], ways[1:], sense=1.0)
+        return anticipated(config, LIMITS, ways[0], ways[1:], sense=1.0)
 
     wanted = room / small * length * np.tan(mine(small).angle)
     assume(abs(wanted - radius) > 1e-6)
@@ -143,7 +154,7 @@ def test_a_circle_fits_where_it_does_not_reach_beyond_the_goals(
 
 def test_what_does_not_fit_is_left_until_nobody_is_met_or_the_goal_is_another() -> None:
     crowd, few = ring(16), ring(3)
-    mine = Anticipation(CONFIG, *LIMITS, 1.0, AN_EPOCH)
+    mine = Anticipation(WHOLE_CONFIG, LEAST, 1.0)
     alone = np.empty((0, 2, 3))
     turned = found(few[1:])
     assert turned.angle > 0.0
@@ -160,7 +171,7 @@ def test_what_does_not_fit_is_left_until_nobody_is_met_or_the_goal_is_another() 
 
 def test_two_that_meet_fly_straight_until_there_is_a_third() -> None:
     """Once there are several, it anticipates until it meets nobody."""
-    mine = Anticipation(CONFIG, *LIMITS, 1.0, AN_EPOCH)
+    mine = Anticipation(WHOLE_CONFIG, LEAST, 1.0)
     one, two = ring(2)[1:], ring(4)[1:3]
     assert found(one).angle > 0.0
     assert mine.met(OWN, one, NEW) == NOBODY
@@ -172,7 +183,7 @@ def test_two_that_meet_fly_straight_until_there_is_a_third() -> None:
 
 def at_age(age: float, others: Array) -> Anticipated:
     """Return what a vehicle does that has agreements on plans of this ``age`` (s)."""
-    return Anticipation(CONFIG, *LIMITS, 1.0, AN_EPOCH).met(OWN, others, age)
+    return Anticipation(WHOLE_CONFIG, LEAST, 1.0).met(OWN, others, age)
 
 
 @given(st.floats(0.0, 3.0), st.floats(0.0, 3.0))
