@@ -30,7 +30,7 @@ from companion.avoidance.certified.fingerprint import fingerprint
 from companion.backup.additions import SentAdditions
 from companion.backup.announced_plans import AGREES_M, AnnouncedPlans
 from companion.backup.last_farewell import LastFarewell
-from companion.backup.links import BACKUP, LINKS, accepts
+from companion.backup.links import BACKUP, Links
 from companion.config import CompanionConfig
 from companion.estimation.origins import Origins
 from companion.flight.autopilots import Profile, is_guided
@@ -55,7 +55,6 @@ from mavlink_bridge.messages import (
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
-from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import unpack as unpack_plan
 from mavlink_bridge.wire.signing import Signing
@@ -86,8 +85,7 @@ class BackupNode:
         self.name = f"backup-{system}"
         self._config, self._fleet = config, fleet
         self._own = Source(system, BACKUP)
-        self._codecs = {link: Codec(accepts(link, system), signing) for link in LINKS}
-        self._signing = signing
+        self._links = Links(system, signing)
         self._plans = AnnouncedPlans(fleet.fingerprint, config.certified.epoch_us)
         self._additions = SentAdditions(config.tracking, self._plans)
         self._last_word = LastFarewell(self._own, config.certified, fingerprint(config, fleet))
@@ -112,10 +110,7 @@ class BackupNode:
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Receive messages; while the companion is silent, send the set-point of its plan at ``now`` (µs)."""
-        if self._signing is not None:
-            self._signing.present(now)
-        messages = [message for link, data in inbox for message in self._codecs[link].feed(data, whole=True)]
-        self.receive(now, messages)
+        self.receive(now, self._links.decode(now, inbox))
         return self.advance(now)
 
     def receive(self, now: int, messages: Sequence[Message]) -> None:
@@ -163,7 +158,7 @@ class BackupNode:
             added.acceleration,
             added=added.velocity,
         )
-        return [*beat, Datagram("autopilot", self._codecs["autopilot"].encode(message))]
+        return [*beat, self._links.encode("autopilot", message)]
 
     def farewell(self, now: int) -> list[Message]:
         """Return the newest plan, and the statement that it is the companion's last one.
@@ -199,7 +194,7 @@ class BackupNode:
             return []
         self._next_beat = now + _SECOND_US
         beat = onboard_heartbeat(self._own)
-        return [Datagram("autopilot", self._codecs["autopilot"].encode(beat))]
+        return [self._links.encode("autopilot", beat)]
 
     def _receive(self, now: int, message: Message) -> None:
         """Receive a message of the companion or of its autopilot."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from companion.backup.links import LINKS, accepts
+from companion.backup.links import Links
 from companion.backup_node import BackupNode
 from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.messages import GpsGlobalOrigin, Message, Tunnel
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.fleet_time import PAYLOAD_TYPE, unpack
 from mavlink_bridge.wire.signing import Signing
 
@@ -31,8 +30,7 @@ class FleetTimeBackup:
         self.name = self._node.name
         self._ahead: int | None = None
         self._carried = 0
-        self._signing = signing
-        self._codecs = {link: Codec(accepts(link, system), signing) for link in LINKS}
+        self._links = Links(system, signing)
         # The autopilot's last origin, which may not come again, for the next backup node.
         self._origin: GpsGlobalOrigin | None = None
         self._begins = True
@@ -62,10 +60,7 @@ class FleetTimeBackup:
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Step the backup node at ``now`` (µs, own clock); before fleet time is known nothing happens."""
-        if self._signing is not None:
-            self._signing.present(now)
-        messages = [message for link, data in inbox for message in self._codecs[link].feed(data, whole=True)]
-        self.receive(now, messages)
+        self.receive(now, self._links.decode(now, inbox))
         return self.advance(now)
 
     def receive(self, now: int, messages: Sequence[Message]) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sitl.backends.jsbsim_model import FOOT, POUND
 from sitl.vehicle.airframe import FloatArray
 from sitl.vehicle.body import Quaternion
-from sitl.vehicle.compiled import entry, kernel, sources_digest
+from sitl.vehicle.compiled import FLIGHT_SOURCES, entry, kernel, sources_digest
 from sitl.vehicle.observer import observed
 from sitl.vehicle.pipeline import FLYING, LANDED, STATE_SIZE, command_motors
 from sitl.vehicle.rotors import wrench
@@ -152,21 +152,7 @@ def _build(digest: int) -> tuple[_Steer, _Sense]:
 
 
 _steer, _sense = _build(
-    sources_digest(
-        "simd.py",
-        "simd_compiled.py",
-        "vectors.py",
-        "derivatives.py",
-        "angles.py",
-        "body.py",
-        "rotors.py",
-        "allocation.py",
-        "controller.py",
-        "observer.py",
-        "pipeline.py",
-        "../backends/jsbsim_model.py",
-        "../backends/jsbsim_pilot.py",
-    )
+    sources_digest(*FLIGHT_SOURCES, "../backends/jsbsim_model.py", "../backends/jsbsim_pilot.py")
 )
 
 

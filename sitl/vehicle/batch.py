@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl.vehicle.airframe import FloatArray
-from sitl.vehicle.compiled import entry, kernel, sources_digest
+from sitl.vehicle.compiled import FLIGHT_SOURCES, entry, kernel, sources_digest
 from sitl.vehicle.pipeline import COMMAND_SIZE, advance
 from sitl.vehicle.simd import LANES
 
@@ -93,23 +93,7 @@ def _build(digest: int) -> tuple[_Rows, _Rows]:
     return singly, in_blocks
 
 
-_singly, _in_blocks = _build(
-    sources_digest(
-        "simd.py",
-        "simd_compiled.py",
-        "vectors.py",
-        "derivatives.py",
-        "angles.py",
-        "body.py",
-        "rotors.py",
-        "allocation.py",
-        "controller.py",
-        "ground.py",
-        "observer.py",
-        "pipeline.py",
-        "batch.py",
-    )
-)
+_singly, _in_blocks = _build(sources_digest(*FLIGHT_SOURCES, "ground.py", "batch.py"))
 
 
 def advance_rows(

@@ -16,6 +16,21 @@ import numba
 
 import sitl.vehicle.simd_compiled  # noqa: F401  (registers the lanes with numba)
 
+FLIGHT_SOURCES = (
+    "simd.py",
+    "simd_compiled.py",
+    "vectors.py",
+    "derivatives.py",
+    "angles.py",
+    "body.py",
+    "rotors.py",
+    "allocation.py",
+    "controller.py",
+    "observer.py",
+    "pipeline.py",
+)
+"""Files from which the kernels of a flight come, whichever integrator moves the body."""
+
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 

@@ -21,10 +21,10 @@ from mcap.records import Channel, Message, Schema
 
 from outrider.errors import InputError
 from outrider.export.attitude import along_down, quaternions
-from outrider.export.px4_topics import quaternion
 from outrider.palette import VEHICLES, rgb
 from outrider.resources import find
 from outrider.yaml_files.yaml_file import load
+from sitl.values.attitudes import quaternion
 from sitl.vehicle.config import VehicleConfig
 from tests.outrider.export.runs import SYSTEMS, everything, received
 

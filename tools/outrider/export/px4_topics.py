@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from outrider.export.ulog_file import Topic
 from outrider.logs.dialect import Kind
+from sitl.values.attitudes import quaternion
 
 _ARMED, _DISARMED = 2, 1
 """Values of PX4's arming_state."""
@@ -202,20 +203,4 @@ def _setpoint(values: Values) -> tuple[Numbers, Numbers, Numbers, float, float]:
         acceleration,
         _NAN if mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE else values["yaw"],
         _NAN if mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE else values["yaw_rate"],
-    )
-
-
-def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Return the Hamilton quaternion (w, x, y, z) of a body (FRD) in NED.
-
-    The body is rotated by yaw, then pitch, then roll (rad).
-    """
-    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
-    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
     )
