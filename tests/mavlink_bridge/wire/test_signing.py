@@ -12,8 +12,8 @@ from mavlink_bridge.key import Key
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.framing import without_signature
 from mavlink_bridge.wire.signing import LATEST, LEAD, MINUTE, RADIOS, STREAMS, Refusal, Signing
+from tests.mavlink_bridge.message_values import UNKNOWN_TO_PEER, any_message, known_message
 from tests.mavlink_bridge.signers import KEY, ME, NOW, SECOND, beat, frame_of, peer, signed, signing, stamp_at
-from tests.mavlink_bridge.wire.test_codec import UNKNOWN_TO_PEER, any_message, known_message
 
 OTHER = Key.of_passphrase("battery staple")
 STAMP = stamp_at(NOW)
