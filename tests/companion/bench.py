@@ -41,6 +41,9 @@ from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.signing import Signing
 
 PROFILES = {"ardupilot": ARDUPILOT, "px4": PX4}
+FLAVOURS = tuple(PROFILES)
+HOLDING = np.array([0.0, 0.0, 5.0])
+"""Place (m) of the vehicle of ``flying``."""
 FLEET = FleetFrame(47.397742, 8.545594, 488.0)
 SYSTEM, TARGET = 11, 1
 AUTOPILOT, GROUND = Source(SYSTEM, 1), Source(255, 190)
@@ -244,6 +247,19 @@ class Bench:
 def only(kind: type[M], sent: Iterable[tuple[str, Message]], link: str = "autopilot") -> list[M]:
     """The messages of one kind on one link."""
     return [message for name, message in sent if name == link and isinstance(message, kind)]
+
+
+def setpoints(sent: Iterable[tuple[str, Message]]) -> list[SetpointLocal]:
+    return only(SetpointLocal, sent)
+
+
+def commands(sent: Iterable[tuple[str, Message]]) -> list[int]:
+    """What is asked of the autopilot beside messages."""
+    return [
+        m.command
+        for m in only(CommandLong, sent)
+        if m.command not in (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)
+    ]
 
 
 def numbers_of(message: SetpointLocal) -> list[float]:

@@ -36,7 +36,7 @@ from mavlink_bridge.wire.signing import Signing
 from outrider.onboard.backup_copies import Copies, copies_pair, unpack
 from outrider.onboard.backup_pilot import DEAF_US, BackupPilot
 from outrider.supervision.supervised_node import SETTLING_US
-from tests.companion.test_backup_node import BEGIN, FLEET, plan_from
+from tests.companion.backup_bench import BEGIN, FLEET, plan_from
 
 SYSTEM: Final = 11
 CONFIG: Final = CompanionConfig.model_validate(
