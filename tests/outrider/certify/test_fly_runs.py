@@ -17,13 +17,6 @@ from outrider.certify.verdict import Verdict, judge
 from outrider.errors import InputError
 from outrider.runs.configuration import resolved
 from outrider.scenarios.companion_settings import settings_of
-from tests.outrider.certify.test_runs import fly
-
-
-@pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of a scenario."""
-    return fly(tmp_path_factory.mktemp("flown") / "run", 3)
 
 
 def verdict(directory: Path) -> Verdict:

@@ -23,8 +23,8 @@ from outrider.scenarios.options import apply
 from outrider.scenarios.world_file import read_world, write_world
 from outrider.simulation.preparation import Prepared
 from outrider.swarm import command as swarm
+from tests.outrider.certify.runs import CERTIFIED
 from tests.outrider.certify.test_fly_runs import as_fly
-from tests.outrider.certify.test_runs import CERTIFIED
 from tests.outrider.shipped import FIREFLY, scenario
 
 NEARER = "a plan nearer to a fixed obstacle than certified"
@@ -61,12 +61,6 @@ def fly(directory: Path, obstacles: list[dict[str, object]], *, cap_s: float = 5
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return fly(tmp_path_factory.mktemp("flown") / "run", [POSTS[0], BOXES[1], *FAR])
-
-
-@pytest.fixture
-def run(flown: Path, tmp_path: Path) -> Path:
-    """A copy that may be spoilt."""
-    return Path(shutil.copytree(flown, tmp_path / "run"))
 
 
 def verdict(directory: Path) -> Verdict:
