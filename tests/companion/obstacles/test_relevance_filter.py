@@ -255,7 +255,7 @@ def test_an_ignored_companion_goes_on_being_its_vehicles_voice(loss):
         listener.receive(now, *(message for message in said if random.random() > loss))
         listener.look(now + PERIOD // 2)
         if now > NOW + 2_000_000:
-            tracks.add(listener.world.neighbours._senders[OTHER].track)
+            tracks.add(listener.world.neighbours._tracks._senders[OTHER].track)
     assert len(tracks) == 1
     assert listener.decoded() < 600
 

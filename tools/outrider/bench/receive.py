@@ -14,7 +14,7 @@ import numpy as np
 
 from companion.config import CompanionConfig
 from companion.obstacles import shared_plans
-from companion.obstacles.neighbours import measurement_of
+from companion.obstacles.neighbour_tracks import measurement_of
 from companion.telemetry.sharing import position_message
 from companion.values.components import COMPONENT
 from companion.world import World
