@@ -11,15 +11,17 @@ from pathlib import Path
 import pytest
 
 from outrider.__main__ import main
-from outrider.terminal import progress_lines
+from outrider.terminal import compilation, progress_lines
 from tests.outrider.said import Ended, Run
 
 
 @pytest.fixture(autouse=True)
 def _any_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a command writes depends neither on how fast the machine is nor on the terminal that the tests
-    were started in: no line of progress, however long something takes, and the width of a pipe."""
+    """What a command writes does not depend on how fast the machine is, on what it has compiled before, or on
+    the terminal that the tests were started in: no line of progress, however long something takes, no notice
+    of a compilation, and the width of a pipe."""
     monkeypatch.setattr(progress_lines, "LINE_S", math.inf)
+    monkeypatch.setattr(compilation, "report_compilation", lambda to: None)
     monkeypatch.setenv("COLUMNS", "80")
 
 
