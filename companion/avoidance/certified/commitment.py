@@ -180,13 +180,14 @@ class Commitment:
         """Make the next epoch's plan; return False if none was found and the old plan is carried on.
 
         ``goal`` is where the progress of the plan's end is measured. ``outside`` (m): by how much a vehicle
-        has left its tube; so much more distance is kept on the own side of each plane, where the committed
-        plan does.
+        has left its tube; both sides of each plane together keep twice so much more distance, where their
+        committed plans do.
 
         Raises CompanionError without a committed plan.
         """
         start, own, flown = self._carried()
-        # Of the distance beyond the least one, an agreement leaves each side a half.
+        # Of the distance beyond the least one, an agreement leaves each side its share: a half, or with
+        # ``plane_shift`` more or less. So both sides together keep ``spare`` more.
         spare = self._config.spare + 2.0 * outside
         corridor = planes(own, others, spare, upright=self._planar)
         state = State(own[0, 0], start.velocity_m_s, self._last_acceleration(), flown)

@@ -324,8 +324,8 @@ class CertifiedFlight:
         """Record how far the vehicle is from its plan.
 
         Outside the tube the guarantee is suspended; the plan stays, because the autopilot returns to it. The
-        statements give the excess, and until the vehicle is back, it and the others keep so much more
-        distance in new plans, where their committed plans do.
+        statements give the excess, and until the vehicle is back, it and the others keep more distance in new
+        plans, each two of them twice the excess, where their committed plans do.
         """
         horizon = self.commitment.horizon()
         if horizon is None:
