@@ -12,6 +12,7 @@ plans changes.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
+from math import dist, inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,8 @@ _NARROW = 0.2
 """Share of ``spare`` with which a way is searched where there is none with all of it."""
 _SEEN = 0.1
 """Share of ``spare`` that a way must keep while it is followed: others move a little."""
+_GAIN_M, _STUCK_US = 0.25, 5_000_000
+"""Least gain of length on ways, and the time (µs) without one after which they count as too narrow."""
 
 
 class SpaceDetour:
@@ -66,6 +69,15 @@ class SpaceDetour:
         """Whether the last search found no way."""
         self.begun = 0
         """Number of ways that were begun."""
+        self.narrow = False
+        """Whether the vehicle has not got on for some time on ways that were found.
+
+        Near its ends a way may be nearer to others than plans: no plan passes a gap that is too narrow by a
+        few centimetres, and a vehicle that waits in it finds a way through it again and again.
+        """
+        self._best = inf
+        self._waited = self._measured_at = 0
+        self._counted_from: Array | None = None
 
     def prepare(self) -> None:
         """Work out the clearances of fixed obstacles, which take a tenth of a second or more with many."""
@@ -87,8 +99,7 @@ class SpaceDetour:
         ``stalled``: there is no progress. ``others`` returns those that rest. Without a way it is the goal.
         """
         if self._goal is not None and float(np.abs(goal - self._goal).max()) > _MOVED_M:
-            self._way = self._search = None
-            self.enclosed = False
+            self._forget()
         self._goal = goal
         if self._way is None and self._search is None and not (stalled or self.enclosed):
             return Subgoal(goal, 0.0)
@@ -97,8 +108,7 @@ class SpaceDetour:
         kept = self._kept + _SEEN * self._spare
         least = balls._replace(radii=balls.radii + kept).without(rest).without(goal)
         if self._free(least, rest, goal[None])[0]:
-            self._way = self._search = None
-            self.enclosed = False
+            self._forget()
             return Subgoal(goal, 0.0)
         # A way that ends beside a goal that has moved a little does not lead there.
         ends = stalled and self._way is not None and len(self._way) == 1
@@ -109,7 +119,30 @@ class SpaceDetour:
             self._go_on(now, rest, goal, balls)
         if self._way is None:
             return Subgoal(goal, 0.0)
-        return Subgoal(self._way[0], float(lengths(self._way)[-1]))
+        subgoal = Subgoal(self._way[0], float(lengths(self._way)[-1]))
+        self._measure(now, rest, subgoal)
+        return subgoal
+
+    def _forget(self) -> None:
+        """Forget the way and its search: the goal is another one, or the line to it is free."""
+        self._way = self._search = self._counted_from = None
+        self.enclosed = self.narrow = False
+
+    def _measure(self, now: int, rest: Array, subgoal: Subgoal) -> None:
+        """Note at ``now`` (µs) whether the end of the plan, ``rest`` (3,), m, gets on on the way.
+
+        Ways that are begun within a least distance count as one: each begins where the last one was lost.
+        """
+        left = dist(rest, subgoal.place) + subgoal.beyond
+        if self._counted_from is None or dist(rest, self._counted_from) > _ACROSS * self._cell:
+            self._counted_from, self._best = rest.copy(), inf
+        if left < self._best - _GAIN_M:
+            self._best, self._waited = left, 0
+        else:
+            # Time without plans is no time without progress.
+            self._waited += min(now - self._measured_at, _EVERY_US)
+        self._measured_at = now
+        self.narrow = self._waited > _STUCK_US
 
     def _free(self, least: Balls, places: Array, ends: Array) -> NDArray[np.bool_]:
         """Return whether the lines from ``places`` (k, 3) or (3,) to ``ends`` (k, 3), m, are free, (k,)."""

@@ -122,7 +122,8 @@ class PlanGoals:
         subgoal = self._subgoal(now, epoch, rest, aim)
         goal = subgoal.place
         if room is not None:
-            closed = self._detour.through or (self._way is not None and self._way.closed)
+            narrow = self._space is not None and self._space.narrow
+            closed = narrow or self._detour.through or (self._way is not None and self._way.closed)
             asked = room.asked(rest, goal, closed=closed)
         if not self._gives_way:
             tells = anticipates or asked is not None

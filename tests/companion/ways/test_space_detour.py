@@ -165,6 +165,30 @@ def test_a_way_that_is_closed_is_searched_anew_without_a_stall() -> None:
     assert np.sign(detour._way[np.abs(detour._way[:, 0]).argmin(), 1]) == -side
 
 
+def test_a_way_on_which_a_vehicle_does_not_get_on_counts_as_narrow() -> None:
+    """After five seconds at one place; not while it flies along the way, and not towards another goal."""
+    detour, wall = SpaceDetour((), LIMITS, D, D, ROOM), resting(WALL)
+    _, way = followed(detour, START, GOAL, wall)
+    assert way is not None
+
+    def step(tenths: int, rest: Array, goal: Array = GOAL) -> None:
+        detour.towards(100_000_000 + 100_000 * tenths, rest, goal, lambda: wall, stalled=False)
+
+    places = along(way)[: len(along(way)) // 4]
+    for tenths in range(80):
+        step(tenths, places[tenths * len(places) // 80])
+        assert not detour.narrow
+    here = places[-1]
+    for tenths in range(80, 140):
+        step(tenths, here)
+    assert detour.narrow
+    # Ways that are begun where the last one was lost count as one with it.
+    step(139, here + np.array([0.0, 0.1, 0.0]))
+    assert detour.narrow
+    step(140, here, GOAL - np.array([0.6, 0.0, 0.0]))
+    assert not detour.narrow
+
+
 def flown(starts: Array, goals: Array, limits: LimitsConfig, seconds: int) -> float:
     """Return how far from its goal a vehicle is at the end, at most, m; all keep their distances."""
     swarm = Swarm(
