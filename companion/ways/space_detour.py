@@ -46,6 +46,31 @@ _GAIN_M, _STUCK_US = 0.25, 5_000_000
 """Least gain of length on ways, and the time (µs) without one after which they count as too narrow."""
 
 
+class _Progress:
+    """Progress of one vehicle on its ways to one goal.
+
+    Ways that are begun within ``near`` (m) of each other count as one: each begins where the last one was
+    lost. ``waited``: time (µs) with plans since the way last became shorter.
+    """
+
+    def __init__(self, near: float) -> None:
+        self._near = near
+        self._begun_at: Array | None = None
+        self._shortest = inf
+        self._noted_at = self.waited = 0
+
+    def note(self, now: int, rest: Array, left: float) -> None:
+        """Note at ``now`` (µs) a plan that ends at ``rest`` (3,), m; ``left`` (m): the length of its way."""
+        if self._begun_at is None or dist(rest, self._begun_at) > self._near:
+            self._begun_at, self._shortest = rest.copy(), inf
+        if left < self._shortest - _GAIN_M:
+            self._shortest, self.waited = left, 0
+        else:
+            # Time without plans is no time without progress.
+            self.waited += min(now - self._noted_at, _EVERY_US)
+        self._noted_at = now
+
+
 class SpaceDetour:
     """Way of one vehicle past others, among ``obstacles`` within ``limits``.
 
@@ -59,7 +84,7 @@ class SpaceDetour:
         self._obstacles, self._limits = tuple(obstacles), limits
         self._kept, self._spare = kept, spare
         self._clearances = (kept + spare, kept + _NARROW * spare)
-        self._cell, self._spacing = between / _ACROSS, _BETWEEN * between
+        self._between, self._cell, self._spacing = between, between / _ACROSS, _BETWEEN * between
         self._clear: Clearance | None = None
         self._way: Array | None = None
         self._goal: Array | None = None
@@ -69,15 +94,7 @@ class SpaceDetour:
         """Whether the last search found no way."""
         self.begun = 0
         """Number of ways that were begun."""
-        self.narrow = False
-        """Whether the vehicle has not got on for some time on ways that were found.
-
-        Near its ends a way may be nearer to others than plans: no plan passes a gap that is too narrow by a
-        few centimetres, and a vehicle that waits in it finds a way through it again and again.
-        """
-        self._best = inf
-        self._waited = self._measured_at = 0
-        self._counted_from: Array | None = None
+        self._progress = _Progress(between)
 
     def prepare(self) -> None:
         """Work out the clearances of fixed obstacles, which take a tenth of a second or more with many."""
@@ -90,6 +107,15 @@ class SpaceDetour:
     def follows(self) -> bool:
         """Whether the last sub-goal is on a way."""
         return self._way is not None
+
+    @property
+    def narrow(self) -> bool:
+        """Whether the vehicle has not got on for some time on ways that were found.
+
+        Near its ends a way may be nearer to others than plans: no plan passes a gap that is too narrow by a
+        few centimetres, and a vehicle that waits in it finds a way through it again and again.
+        """
+        return self._progress.waited > _STUCK_US
 
     def towards(
         self, now: int, rest: Array, goal: Array, others: Callable[[], Balls], *, stalled: bool
@@ -120,29 +146,14 @@ class SpaceDetour:
         if self._way is None:
             return Subgoal(goal, 0.0)
         subgoal = Subgoal(self._way[0], float(lengths(self._way)[-1]))
-        self._measure(now, rest, subgoal)
+        self._progress.note(now, rest, dist(rest, subgoal.place) + subgoal.beyond)
         return subgoal
 
     def _forget(self) -> None:
         """Forget the way and its search: the goal is another one, or the line to it is free."""
-        self._way = self._search = self._counted_from = None
-        self.enclosed = self.narrow = False
-
-    def _measure(self, now: int, rest: Array, subgoal: Subgoal) -> None:
-        """Note at ``now`` (µs) whether the end of the plan, ``rest`` (3,), m, gets on on the way.
-
-        Ways that are begun within a least distance count as one: each begins where the last one was lost.
-        """
-        left = dist(rest, subgoal.place) + subgoal.beyond
-        if self._counted_from is None or dist(rest, self._counted_from) > _ACROSS * self._cell:
-            self._counted_from, self._best = rest.copy(), inf
-        if left < self._best - _GAIN_M:
-            self._best, self._waited = left, 0
-        else:
-            # Time without plans is no time without progress.
-            self._waited += min(now - self._measured_at, _EVERY_US)
-        self._measured_at = now
-        self.narrow = self._waited > _STUCK_US
+        self._way = self._search = None
+        self._progress = _Progress(self._between)
+        self.enclosed = False
 
     def _free(self, least: Balls, places: Array, ends: Array) -> NDArray[np.bool_]:
         """Return whether the lines from ``places`` (k, 3) or (3,) to ``ends`` (k, 3), m, are free, (k,)."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 import pytest
 
 from outrider.resources import config_root
-from outrider.scenarios.scenario import Scenario
 from outrider.simulation.preparation import measure, prepared
-from outrider.sweep.draw import draw
+from outrider.sweep.cells import scenario_of
 from outrider.sweep.scenes import Scene
+from outrider.sweep.tasks import Task
 from outrider.yaml_files.yaml_file import load
 
 SCENE = config_root() / "scenes" / "certified-fuzz.yaml"
+SEED = 60916
 
 
 @pytest.mark.slow
@@ -20,7 +21,7 @@ def test_a_vehicle_in_a_gap_that_is_too_narrow_asks_for_room() -> None:
 
     Near the places where it begins a way may be nearer to others than plans, so no plan passes the gap.
     """
-    document = draw(load(SCENE, Scene), 60916)
-    summary = measure(prepared(Scenario.model_validate(document), "60916"), 60916)
+    task = Task("certified-fuzz", SEED, load(SCENE, Scene).model_dump_json(), is_scene=True)
+    summary = measure(prepared(scenario_of(task), str(SCENE)), SEED)
     assert summary["others_converge_s"] is not None
     assert summary["d_min_violations"] == 0
