@@ -17,7 +17,6 @@ OWN = Source(11, 195)
 HEIGHT, GROUND = 6.0, 2.5
 HALF = 500_000
 LOCAL = FLEET.local(FLEET.latitude, FLEET.longitude, FLEET.altitude)
-FLAVOURS = tuple(PROFILES)
 IN_FLIGHT = ExtendedSysState(AUTOPILOT, 0, 2)
 _CHECKS = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 HEALTHY = SysStatus(AUTOPILOT, _CHECKS, _CHECKS, _CHECKS, None, None)

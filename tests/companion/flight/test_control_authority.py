@@ -7,9 +7,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.values.phase import Phase
-from tests.companion.bench import PROFILES
+from tests.companion.bench import FLAVOURS, PROFILES
 from tests.companion.flight.rig import (
-    FLAVOURS,
     HEALTHY,
     HEIGHT,
     IN_FLIGHT,

@@ -10,9 +10,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.estimation.tracks import State
 from companion.values.phase import Phase
-from tests.companion.bench import PROFILES
+from tests.companion.bench import FLAVOURS, PROFILES
 from tests.companion.flight.rig import (
-    FLAVOURS,
     HEALTHY,
     HEIGHT,
     ILL,

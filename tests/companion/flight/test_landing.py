@@ -7,8 +7,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.values.phase import Phase
-from tests.companion.bench import ORIGIN_REQUEST, PROFILES
-from tests.companion.flight.rig import FLAVOURS, HEALTHY, HEIGHT, ILL, READY, Rig, beat, landed, state
+from tests.companion.bench import FLAVOURS, ORIGIN_REQUEST, PROFILES
+from tests.companion.flight.rig import HEALTHY, HEIGHT, ILL, READY, Rig, beat, landed, state
 
 OFFBOARD, HOLD, AUTO_LAND = 6 << 16, 4 << 16 | 3 << 24, 4 << 16 | 6 << 24
 

@@ -9,7 +9,8 @@ from companion.config import CompanionConfig
 from companion.flight.state_machine import Pilot
 from companion.values.phase import Phase
 from companion.values.stance import Stance
-from tests.companion.flight.rig import FLAVOURS, HEALTHY, HEIGHT, IN_FLIGHT, Rig, beat, landed
+from tests.companion.bench import FLAVOURS
+from tests.companion.flight.rig import HEALTHY, HEIGHT, IN_FLIGHT, Rig, beat, landed
 
 ON_GROUND = landed(mavlink.MAV_LANDED_STATE_ON_GROUND)
 WAITS = "the agreement of 12 on its column"

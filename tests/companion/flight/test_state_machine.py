@@ -11,8 +11,8 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.values.phase import Phase
-from tests.companion.bench import FLEET, ORIGIN_REQUEST
-from tests.companion.flight.rig import FLAVOURS, GROUND, HEALTHY, HEIGHT, IN_FLIGHT, OWN, Rig, ack, beat
+from tests.companion.bench import FLAVOURS, FLEET, ORIGIN_REQUEST
+from tests.companion.flight.rig import GROUND, HEALTHY, HEIGHT, IN_FLIGHT, OWN, Rig, ack, beat
 
 
 class Order(NamedTuple):

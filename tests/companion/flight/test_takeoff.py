@@ -15,9 +15,8 @@ from companion.flight.state_machine import Pilot
 from companion.values.phase import Phase
 from companion.world import View
 from mavlink_bridge.messages import Message
-from tests.companion.bench import FLEET, ORIGIN_REQUEST, TICK
+from tests.companion.bench import FLAVOURS, FLEET, ORIGIN_REQUEST, TICK
 from tests.companion.flight.rig import (
-    FLAVOURS,
     GROUND,
     HALF,
     HEALTHY,

@@ -19,6 +19,7 @@ from mavlink_bridge.errors import LogError
 from mavlink_bridge.messages import Heartbeat, Source, StatusText
 from mavlink_bridge.tlog.log import Record, TlogReport, TlogWriter, read_tlog
 from mavlink_bridge.wire.codec import Codec
+from tests.mavlink_bridge.damage import damaged
 
 NOW = 1_700_000_000_000_000
 ME = Source(11, 1)
@@ -187,19 +188,10 @@ def test_a_truncated_log_keeps_all_whole_records(length: int) -> None:
 @given(st.data(), st.sampled_from(["flight.tlog", "flight.tlog.gz"]))
 @settings(max_examples=150)
 def test_mutated_logs_raise_nothing_but_log_error(data: st.DataObject, name: str) -> None:
-    log = bytearray(gzip.compress(whole(), mtime=0) if name.endswith(".gz") else whole())
-    for _ in range(data.draw(st.integers(1, 8))):
-        at = data.draw(st.integers(0, len(log)))
-        action = data.draw(st.sampled_from(["flip", "cut", "insert"]))
-        if action == "insert":
-            log[at:at] = data.draw(st.binary(max_size=40))
-        elif at < len(log):
-            if action == "flip":
-                log[at] ^= data.draw(st.integers(1, 255))
-            else:
-                del log[at : at + data.draw(st.integers(1, 100))]
+    log = gzip.compress(whole(), mtime=0) if name.endswith(".gz") else whole()
+    log = damaged(log, data, times=8, inserted=40, cut=100)
     try:
-        records, report = read(bytes(log), name)
+        records, report = read(log, name)
     except LogError:
         return
     assert report.good == len(records)

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from mavlink_bridge import messages as m
 from mavlink_bridge.messages import BY_ID, BY_TYPE
 from mavlink_bridge.wire.codec import Codec
+from tests.mavlink_bridge.damage import damaged
 from tests.mavlink_bridge.message_values import (
     BEAT,
     POSITION,
@@ -48,21 +49,6 @@ def test_chunks_make_no_difference_and_versions_mix(
     assert pieces.counters == whole.counters
 
 
-def mutate(stream: bytes, data: st.DataObject) -> bytes:
-    broken = bytearray(stream)
-    for _ in range(data.draw(st.integers(1, 6))):
-        at = data.draw(st.integers(0, len(broken)))
-        action = data.draw(st.sampled_from(["flip", "cut", "insert"]))
-        if action == "insert":
-            broken[at:at] = data.draw(st.binary(max_size=12))
-        elif at < len(broken):
-            if action == "flip":
-                broken[at] ^= data.draw(st.integers(1, 255))
-            else:
-                del broken[at : at + data.draw(st.integers(1, 20))]
-    return bytes(broken)
-
-
 TRAILER = b"".join(wire(POSITION) for _ in range(20))
 
 
@@ -72,7 +58,7 @@ TRAILER = b"".join(wire(POSITION) for _ in range(20))
 )
 def test_any_bytes_are_survived_and_accounted_for(stream: bytes, data: st.DataObject) -> None:
     """In: bytes of frames handed out, of frames passed over, of none, and of one not yet complete."""
-    stream = mutate(stream, data)
+    stream = damaged(stream, data, times=6, inserted=12, cut=20)
     codec = Codec()
     found = codec.feed(stream + TRAILER)
     good, bad, unknown, filtered, skipped, _ = codec.counters
