@@ -5,7 +5,7 @@ All are given on the plan's own knots.
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from math import hypot, sqrt
 
 import numpy as np
@@ -236,12 +236,14 @@ class ConstraintSources:
         """
         return levelled(np.broadcast_to(place, own.shape), own), least
 
-    def resting(self, epoch: int, here: Array, there: Array, agreements: Agreements) -> list[Discs]:
+    def resting(
+        self, epoch: int, here: Array, there: Array, agreements: Agreements, goals: Sequence[Array] = ()
+    ) -> list[Discs]:
         """Return the discs that a way must avoid from ``epoch`` (µs) on; then those that stay for ever alone.
 
         They are seen from above: where posts, spheres, boxes, landed vehicles, and vehicles whose newest plan
         rests keep a vehicle away whose height is between those of ``here`` and ``there`` (3,), m, where the
-        way begins and ends.
+        way begins and ends. ``goals`` (3,), m, of others count as if these rested there.
         """
         low, high = min(here[2], there[2]), max(here[2], there[2])
         fixed = []
@@ -251,12 +253,16 @@ class ConstraintSources:
         landed = [
             (tuple(last.controls[-1, 2, :2]), self.from_last(last), 0.0) for last in agreements.left.values()
         ]
+        ends = [
+            (end, self._config.planar or system in agreements.columns)
+            for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items()
+            if system not in agreements.left
+        ]
+        ends += [(goal, self._config.planar) for goal in goals]
         vehicles = []
-        for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():
-            if system not in agreements.left:
-                level = self._config.planar or system in agreements.columns
-                above = 0.0 if level else max(end[2] - high, low - end[2], 0.0) / self._config.field.downwash
-                vehicles.append((tuple(end[:2]), self.between, above))
+        for end, level in ends:
+            above = 0.0 if level else max(end[2] - high, low - end[2], 0.0) / self._config.field.downwash
+            vehicles.append((tuple(end[:2]), self.between, above))
         rectangles = self._rectangles(here, there)
         return [
             _discs(found)._replace(rectangles=rectangles)
@@ -282,6 +288,11 @@ class ConstraintSources:
                 flat.append(0.0 if level else 1.0 / self._config.field.downwash)
         radii = np.array(kept) - self._from_surfaces
         return Balls(np.array(places).reshape(-1, 3), radii, np.array(flat))
+
+    def covers(self, epoch: int, goal: Array, agreements: Agreements) -> bool:
+        """Return whether a vehicle rests, from ``epoch`` (µs) on, nearer to ``goal`` (3,), m, than plans."""
+        balls = self.at_rest(epoch, agreements)
+        return bool((balls.distance(goal[None]) < self._from_surfaces).any())
 
     def _rectangles(self, here: Array, there: Array) -> Rectangles:
         """Return where boxes keep a vehicle away on a way from ``here`` to ``there`` (3,), m.

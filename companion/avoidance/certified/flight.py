@@ -67,7 +67,8 @@ class CertifiedFlight:
         self._listens_since: int | None = None
         self._last_step = 0
         self._sources = ConstraintSources(config, steps)
-        self._places = Places(config, own.system, self._sources)
+        self._told = ToldGoals(own, fleet.fingerprint)
+        self._places = Places(config, own.system, self._told, self._sources)
         downwash, between = config.field.downwash, self._sources.between
         distances = Distances(
             between,
@@ -100,7 +101,6 @@ class CertifiedFlight:
         self.left_tube = 0
         """Number of times that the vehicle left the tube."""
         self._outside = 0.0
-        self._told = ToldGoals(own, fleet.fingerprint)
         self._goals = PlanGoals(
             config, own, self.agreements, self._sources, self._told, self._deadlock_turn, sense
         )
@@ -361,7 +361,7 @@ class CertifiedFlight:
         own = commitment.own()
         epoch = commitment.epoch(now)
         others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
-        destination = self._places.destination(epoch, own[-1, 2], aim, self.agreements)
+        destination = self._places.destination(now, epoch, own[-1, 2], aim, self.agreements)
         given = aim.given and destination is aim.destination
         moving = aim.path is not None
         subgoal, goal = self._goals.chosen(now, epoch, start, own, destination, given=given, moving=moving)

@@ -9,6 +9,7 @@ from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.constraint_sources import BESIDE_M, ConstraintSources
 from companion.avoidance.certified.free_place import covered, free_place
 from companion.avoidance.certified.surface_places import Candidate, Taken, place_of
+from companion.avoidance.certified.told_goals import ToldGoals
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.config.formation import Nearest
@@ -22,23 +23,25 @@ _ROUNDING_M = 1e-6
 
 
 class Places:
-    """Places of the vehicle ``own`` (system id), beside what its constraint ``sources`` say."""
+    """Places of the vehicle ``own`` (system id), beside what its ``sources`` and ``told`` goals say."""
 
-    def __init__(self, config: CompanionConfig, own: int, sources: ConstraintSources) -> None:
-        self._config, self._own, self._sources = config, own, sources
+    def __init__(
+        self, config: CompanionConfig, own: int, told: ToldGoals, sources: ConstraintSources
+    ) -> None:
+        self._config, self._own, self._told, self._sources = config, own, told, sources
         # Another formation has places of its own.
         self._assigns = isinstance(config.formation, Nearest)
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self._height = 1.0 / config.field.downwash
 
-    def destination(self, epoch: int, rest: Array, aim: Aim, agreements: Agreements) -> Array:
-        """Return where the plan of the epoch after ``epoch`` (µs) should end, (3,), m.
+    def destination(self, now: int, epoch: int, rest: Array, aim: Aim, agreements: Agreements) -> Array:
+        """Return where the plan of the epoch after ``epoch`` (µs) should end at ``now`` (µs), (3,), m.
 
         ``rest`` (3,), m: where the committed plan ends. ``aim``: with the destination without the others.
         """
         if aim.surface is None:
-            return self._beside_goal(epoch, rest, aim.destination, agreements)
+            return self._beside_goal(now, epoch, rest, aim.destination, agreements)
         return self._on_surface(rest, aim, aim.surface, agreements) if self._assigns else aim.destination
 
     def _on_surface(self, rest: Array, aim: Aim, surface: Surface, agreements: Agreements) -> Array:
@@ -82,8 +85,11 @@ class Places:
             places = np.column_stack([places[:, :2], np.broadcast_to(ends[..., 2], len(places))])
         return np.asarray(inside & self._sources.clear_of_fixed(places))
 
-    def _beside_goal(self, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
-        """Return ``goal`` (3,), m, or the nearest free place if a vehicle that said farewell covers it."""
+    def _beside_goal(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
+        """Return ``goal`` (3,), m, or the nearest free place if a vehicle that said farewell covers it.
+
+        The goals of those that ask for room are not free: nobody is kept from a goal by one that has none.
+        """
         left = agreements.left
         if not left:
             return goal
@@ -91,7 +97,8 @@ class Places:
         radii = np.array([self._sources.from_last(last) for last in left.values()])
         if not covered(goal[:2], ends, radii):
             return goal
-        for discs in self._sources.resting(epoch, rest, goal, agreements):
+        asking = [one.position_m for one in self._told.recent(now).values() if one.room]
+        for discs in self._sources.resting(epoch, rest, goal, agreements, asking):
             place = free_place(goal[:2], discs, self._low[:2], self._high[:2])
             if place is not None:
                 return np.array([place[0], place[1], goal[2]])

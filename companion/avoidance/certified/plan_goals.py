@@ -122,9 +122,7 @@ class PlanGoals:
         subgoal = self._subgoal(now, epoch, rest, aim)
         goal = subgoal.place
         if room is not None:
-            narrow = self._space is not None and self._space.narrow
-            closed = narrow or self._detour.through or (self._way is not None and self._way.closed)
-            asked = room.asked(rest, goal, closed=closed)
+            asked = room.asked(rest, goal, closed=self._closed(epoch, destination))
         if not self._gives_way:
             tells = anticipates or asked is not None
             self._told.tell(destination if tells else None, room=asked)
@@ -184,6 +182,14 @@ class PlanGoals:
             lambda: self._sources.resting(epoch, rest, goal, self._agreements),
             stalled=stalled,
         )
+
+    def _closed(self, epoch: int, goal: Array) -> bool:
+        """Return whether those at rest from ``epoch`` (µs) on close all ways to ``goal`` (3,) or cover it."""
+        if self._detour.through or (self._space is not None and self._space.narrow):
+            return True
+        if self._way is not None and self._way.closed:
+            return True
+        return self._deadlock_turn.stalled and self._sources.covers(epoch, goal, self._agreements)
 
     def _begun(self) -> tuple[int, int]:
         """Return how many detours and how many ways around fixed obstacles were begun."""

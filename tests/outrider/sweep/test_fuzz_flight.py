@@ -1,6 +1,8 @@
-"""A flight of ``certified-fuzz`` that once did not converge, for a cause that needs a whole scene."""
+"""Flights of ``certified-fuzz`` that once did not converge, for causes that need a whole scene."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import pytest
 
@@ -12,7 +14,12 @@ from outrider.sweep.tasks import Task
 from outrider.yaml_files.yaml_file import load
 
 SCENE = config_root() / "scenes" / "certified-fuzz.yaml"
-SEED = 60916
+
+
+def flown(seed: int) -> dict[str, Any]:
+    """Summary of the flight of ``seed``."""
+    task = Task("certified-fuzz", seed, load(SCENE, Scene).model_dump_json(), is_scene=True)
+    return measure(prepared(scenario_of(task), str(SCENE)), seed)
 
 
 @pytest.mark.slow
@@ -21,7 +28,15 @@ def test_a_vehicle_in_a_gap_that_is_too_narrow_asks_for_room() -> None:
 
     Near the places where it begins a way may be nearer to others than plans, so no plan passes the gap.
     """
-    task = Task("certified-fuzz", SEED, load(SCENE, Scene).model_dump_json(), is_scene=True)
-    summary = measure(prepared(scenario_of(task), str(SCENE)), SEED)
+    summary = flown(60916)
+    assert summary["others_converge_s"] is not None
+    assert summary["d_min_violations"] == 0
+
+
+@pytest.mark.slow
+def test_a_vehicle_beside_its_covered_goal_leaves_the_goal_of_another_one() -> None:
+    """A departed vehicle covers its goal; at the nearest free place it kept another one from its own."""
+    summary = flown(60468)
+    assert summary["covered_goals"] == 1
     assert summary["others_converge_s"] is not None
     assert summary["d_min_violations"] == 0

@@ -13,12 +13,14 @@ from companion.avoidance.certified.margins import between, from_surfaces
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.places import Places
 from companion.avoidance.certified.surface_places import Candidate, Taken, place_of
+from companion.avoidance.certified.told_goals import ToldGoals
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.obstacles.static import FixedObstacles
 from companion.surfaces import Circle, Sphere, Surface
 from companion.surfaces.ellipsoid import Ellipsoid
 from companion.values.horizon import Array
+from mavlink_bridge.messages import Source
 from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
 
@@ -114,9 +116,9 @@ def assigned(config: CompanionConfig, ends: dict[int, Array]) -> dict[int, Array
     for own, end in ends.items():
         surface = config.surface_of(own)
         aim = Aim(AT + surface.nearest(end - AT), np.zeros(3), AT, AT, surface)
-        places = Places(config, own, ConstraintSources(config, 17))
+        places = Places(config, own, ToldGoals(Source(own, 1), 7), ConstraintSources(config, 17))
         others: Any = Ends({system: place for system, place in ends.items() if system != own})
-        found[own] = places.destination(0, end, aim, others)
+        found[own] = places.destination(0, 0, end, aim, others)
     return found
 
 

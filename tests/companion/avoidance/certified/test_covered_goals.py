@@ -1,0 +1,105 @@
+"""A vehicle beside its covered goal gives up its place for one whose goal it covers."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from companion.avoidance.certified.committed import resting as at_rest
+from companion.avoidance.certified.constraint_sources import ConstraintSources
+from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
+from companion.avoidance.certified.peer_plans import stored
+from companion.avoidance.certified.places import Places
+from companion.avoidance.certified.plan_goals import PlanGoals
+from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.field.planner import standing
+from companion.config import CompanionConfig
+from companion.config.certified import DeadlockConfig
+from companion.values.horizon import Array
+from mavlink_bridge.messages import Source, Tunnel
+from mavlink_bridge.wire.goal import goal_at, pack, room_to, unpack
+from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
+
+ORIGIN, EAST, UP = np.array([0.0, 0.0, 5.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+SECOND = 1_000_000
+
+
+class Beside:
+    """A vehicle whose goal is 0.5 m east of the origin, where one that said farewell rests."""
+
+    def __init__(self, *, planar: bool) -> None:
+        config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
+        self.told = ToldGoals(Source(1, 1), 7)
+        sources = ConstraintSources(config, STEPS)
+        self.d = sources.between
+        self._places = Places(config, 1, self.told, sources)
+        landed = {9: stored(at_rest(EPOCH, DT, STEPS, ORIGIN, 7))}
+        self._agreements: Any = SimpleNamespace(left=landed, columns=(), resting=lambda *_: {})
+
+    def place(self, now: int) -> Array:
+        """Where it goes at ``now`` µs, (3,), m."""
+        aim = standing(ORIGIN + 0.5 * EAST)
+        return self._places.destination(now, EPOCH, ORIGIN + 2.0 * EAST, aim, self._agreements)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize("rank", [0, 1])
+def test_the_place_beside_a_covered_goal_is_not_on_the_goal_of_one_that_asks_for_room(
+    planar: bool, rank: int
+) -> None:
+    vehicle = Beside(planar=planar)
+    nearest = vehicle.place(0)
+    goal = nearest + 0.7 * vehicle.d * EAST
+    vehicle.told.receive(0, 2, pack(goal_at(goal, 7)))
+    assert (vehicle.place(0) == nearest).all()
+    vehicle.told.receive(0, 2, pack(goal_at(goal, 7, room=room_to(goal, rank))))
+    place = vehicle.place(0)
+    assert np.linalg.norm(place - goal) >= vehicle.d
+    assert np.linalg.norm(place - ORIGIN) >= vehicle.d
+    # What is not told any more is no obstacle.
+    assert (vehicle.place(3 * SECOND) == nearest).all()
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_in_space_a_goal_high_above_the_place_leaves_it_free(planar: bool) -> None:
+    vehicle = Beside(planar=planar)
+    nearest = vehicle.place(0)
+    goal = nearest + 2.5 * vehicle.d * UP
+    vehicle.told.receive(0, 2, pack(goal_at(goal, 7, room=room_to(goal, 0))))
+    assert bool((vehicle.place(0) == nearest).all()) is not planar
+
+
+def asks(covering: dict[int, Array], *, planar: bool) -> bool:
+    """Whether a vehicle asks for room that others keep from its goal at the origin.
+
+    They rest at ``covering`` (3,), m, by system id.
+    """
+    config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
+    sources, told = ConstraintSources(config, STEPS), ToldGoals(Source(1, 1), 7)
+    rest = ORIGIN - 0.6 * sources.between * EAST
+    agreements: Any = SimpleNamespace(
+        left={},
+        columns=(),
+        resting=lambda *_: covering,
+        ends=lambda: covering,
+        newest=dict,
+        age=lambda *_: 0.0,
+    )
+    turn = DeadlockTurn(DeadlockConfig(), 1.0)
+    goals = PlanGoals(config, Source(1, 1), agreements, sources, told, turn, 1.0)
+    goals.prepare(5.0)
+    own, start = np.tile(rest, (STEPS, 3, 1)), at_rest(EPOCH, DT, STEPS, rest, 7)
+    against = Pushes(np.array([[-50.0, 0.0, 0.0]]), np.zeros((1, 3)))
+    while not turn.stalled:
+        turn.learn(rest, ORIGIN, against, 1.0, 0.2)
+    goals.chosen(EPOCH, EPOCH, start, own, ORIGIN, given=True, moving=False)
+    return any(isinstance(one, Tunnel) and unpack(one.payload).room is not None for one in told.messages())
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_vehicle_asks_for_room_while_another_one_rests_on_its_goal(planar: bool) -> None:
+    assert asks({2: ORIGIN + 0.8 * EAST}, planar=planar)
+    assert not asks({2: ORIGIN + 30.0 * EAST}, planar=planar)
