@@ -37,6 +37,8 @@ _RESTED_US, _AT_REST_M = 2_000_000, 0.5
 
 Vehicles that jostle for room rest for a shorter time, and the turn of the goal resolves that.
 """
+_NEAR = 2.0
+"""Distance from a landed vehicle, in least distances from it, up to which others rest because of it."""
 BESIDE_M = 0.05
 """Distance (m) of a way from what plans must keep clear of."""
 _AROUND_M, _MOST_BOXES = 20.0, 8
@@ -289,10 +291,24 @@ class ConstraintSources:
         radii = np.array(kept) - self._from_surfaces
         return Balls(np.array(places).reshape(-1, 3), radii, np.array(flat))
 
-    def covers(self, epoch: int, goal: Array, agreements: Agreements) -> bool:
-        """Return whether a vehicle rests, from ``epoch`` (µs) on, nearer to ``goal`` (3,), m, than plans."""
-        balls = self.at_rest(epoch, agreements)
-        return bool((balls.distance(goal[None]) < self._from_surfaces).any())
+    def displaced(self, epoch: int, goal: Array, agreements: Agreements) -> bool:
+        """Return whether one rests on ``goal`` (3,), m, from ``epoch`` (µs) on, beside its own covered goal.
+
+        That is likely for each that is nearer to ``goal`` than plans, and near a landed vehicle.
+        """
+        left = agreements.left
+        if not left:
+            return False
+        scale = np.array([1.0, 1.0, 0.0 if self._config.planar else 1.0 / self._config.field.downwash])
+        for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():
+            covers = np.linalg.norm(scale * (end - goal)) < self.between
+            if covers and system not in left and any(self._near(end, last) for last in left.values()):
+                return True
+        return False
+
+    def _near(self, place: Array, last: StoredPlan) -> bool:
+        """Return whether one rests at ``place`` (3,), m, because of the landed vehicle of a ``last`` plan."""
+        return hypot(*(place - last.controls[-1, 2])[:2]) < _NEAR * self.from_last(last)
 
     def _rectangles(self, here: Array, there: Array) -> Rectangles:
         """Return where boxes keep a vehicle away on a way from ``here`` to ``there`` (3,), m.

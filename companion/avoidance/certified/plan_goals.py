@@ -184,12 +184,15 @@ class PlanGoals:
         )
 
     def _closed(self, epoch: int, goal: Array) -> bool:
-        """Return whether those at rest from ``epoch`` (µs) on close all ways to ``goal`` (3,) or cover it."""
+        """Return whether those that rest from ``epoch`` (µs) on leave no way to ``goal`` (3,), m.
+
+        One that rests on it because its own goal is covered leaves it.
+        """
         if self._detour.through or (self._space is not None and self._space.narrow):
             return True
         if self._way is not None and self._way.closed:
             return True
-        return self._deadlock_turn.stalled and self._sources.covers(epoch, goal, self._agreements)
+        return self._deadlock_turn.stalled and self._sources.displaced(epoch, goal, self._agreements)
 
     def _begun(self) -> tuple[int, int]:
         """Return how many detours and how many ways around fixed obstacles were begun."""

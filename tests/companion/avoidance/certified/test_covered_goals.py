@@ -72,19 +72,19 @@ def test_in_space_a_goal_high_above_the_place_leaves_it_free(planar: bool) -> No
     assert bool((vehicle.place(0) == nearest).all()) is not planar
 
 
-def asks(covering: dict[int, Array], *, planar: bool) -> bool:
-    """Whether a vehicle asks for room that others keep from its goal at the origin.
+def asks(others: dict[int, Array], landed: Array, *, planar: bool) -> bool:
+    """Whether a vehicle whose goal is the origin asks for room; it makes no progress.
 
-    They rest at ``covering`` (3,), m, by system id.
+    Others rest at ``others`` (3,), m, by system id, and one has ``landed`` (3,).
     """
     config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
     sources, told = ConstraintSources(config, STEPS), ToldGoals(Source(1, 1), 7)
     rest = ORIGIN - 0.6 * sources.between * EAST
     agreements: Any = SimpleNamespace(
-        left={},
+        left={9: stored(at_rest(EPOCH, DT, STEPS, landed, 7))},
         columns=(),
-        resting=lambda *_: covering,
-        ends=lambda: covering,
+        resting=lambda *_: others | {9: landed},
+        ends=lambda: others,
         newest=dict,
         age=lambda *_: 0.0,
     )
@@ -100,6 +100,11 @@ def asks(covering: dict[int, Array], *, planar: bool) -> bool:
 
 
 @pytest.mark.parametrize("planar", [True, False])
-def test_a_vehicle_asks_for_room_while_another_one_rests_on_its_goal(planar: bool) -> None:
-    assert asks({2: ORIGIN + 0.8 * EAST}, planar=planar)
-    assert not asks({2: ORIGIN + 30.0 * EAST}, planar=planar)
+def test_a_vehicle_asks_for_room_while_another_one_rests_on_its_goal_beside_a_landed_one(
+    planar: bool,
+) -> None:
+    beside, landed = ORIGIN + 0.8 * EAST, ORIGIN + 2.0 * EAST
+    assert asks({2: beside}, landed, planar=planar)
+    assert not asks({2: ORIGIN + 30.0 * EAST}, landed, planar=planar)
+    # Of two goals that are too near to each other for both to be reached none is given up.
+    assert not asks({2: beside}, ORIGIN + 30.0 * EAST, planar=planar)
