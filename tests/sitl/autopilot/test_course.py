@@ -42,11 +42,20 @@ def test_a_jump_is_no_jolt(step):
     guidance = led()
     course = Course(guidance, ORIGIN)
     course.next(step)
-    guidance.motion = (ZERO, ZERO, (1.0, 0.0, 0.0))
+    guidance.motion = (ZERO, ZERO, (0.4, 0.0, 0.0))
     guidance.yaw_rate = 1.0
     reference = course.next(step)
-    assert 0.0 < np.linalg.norm(reference.jerk) <= 10.0
+    assert 0.0 < np.linalg.norm(reference.jerk) <= 4.0
     assert 0.0 < reference.yaw_acceleration <= 1.0 / 0.03
+
+
+@pytest.mark.parametrize("step", [2_500, 20_000, 1_000_000])
+def test_a_step_of_the_acceleration_adds_no_jerk(step):
+    guidance = led()
+    course = Course(guidance, ORIGIN)
+    course.next(step)
+    guidance.motion = (ZERO, ZERO, (-4.0, 0.0, 0.0))
+    assert course.next(step).jerk.tolist() == [0.0, 0.0, 0.0]
 
 
 def test_after_a_pause_it_begins_anew():
