@@ -5,7 +5,7 @@ All are given on the plan's own knots.
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from math import hypot, sqrt
 
 import numpy as np
@@ -38,7 +38,7 @@ _RESTED_US, _AT_REST_M = 2_000_000, 0.5
 Vehicles that jostle for room rest for a shorter time, and the turn of the goal resolves that.
 """
 _NEAR = 2.0
-"""Distance from a landed vehicle, in least distances from it, up to which others rest because of it."""
+"""A vehicle that rests nearer to a landed one, in least distances from that, may rest beside its own goal."""
 BESIDE_M = 0.05
 """Distance (m) of a way from what plans must keep clear of."""
 _AROUND_M, _MOST_BOXES = 20.0, 8
@@ -291,24 +291,27 @@ class ConstraintSources:
         radii = np.array(kept) - self._from_surfaces
         return Balls(np.array(places).reshape(-1, 3), radii, np.array(flat))
 
-    def displaced(self, epoch: int, goal: Array, agreements: Agreements) -> bool:
-        """Return whether one rests on ``goal`` (3,), m, from ``epoch`` (µs) on, beside its own covered goal.
+    def occupied(self, epoch: int, goal: Array, agreements: Agreements) -> bool:
+        """Return whether a vehicle rests on ``goal`` (3,), m, from ``epoch`` (µs) on, near a landed one.
 
-        That is likely for each that is nearer to ``goal`` than plans, and near a landed vehicle.
+        It is nearer to ``goal`` than plans keep. The landed vehicle probably covers its own goal.
         """
         left = agreements.left
-        if not left:
-            return False
-        scale = np.array([1.0, 1.0, 0.0 if self._config.planar else 1.0 / self._config.field.downwash])
-        for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():
-            covers = np.linalg.norm(scale * (end - goal)) < self.between
-            if covers and system not in left and any(self._near(end, last) for last in left.values()):
-                return True
-        return False
+        resting = agreements.resting(epoch - _RESTED_US, _AT_REST_M) if left else {}
+        ends = [end for system, end in resting.items() if system not in left]
+        return any(self._apart(end - goal) < self.between and self._near_landed(end, left) for end in ends)
 
-    def _near(self, place: Array, last: StoredPlan) -> bool:
-        """Return whether one rests at ``place`` (3,), m, because of the landed vehicle of a ``last`` plan."""
-        return hypot(*(place - last.controls[-1, 2])[:2]) < _NEAR * self.from_last(last)
+    def _apart(self, difference: Array) -> float:
+        """Return the distance (m) of two vehicles with a ``difference`` (3,), m, of places."""
+        x, y, z = difference.tolist()
+        return hypot(x, y, 0.0 if self._config.planar else z / self._config.field.downwash)
+
+    def _near_landed(self, place: Array, left: Mapping[int, StoredPlan]) -> bool:
+        """Return whether ``place`` (3,), m, is near a landed vehicle of those that ``left``."""
+        return any(
+            hypot(*(place - last.controls[-1, 2])[:2].tolist()) < _NEAR * self.from_last(last)
+            for last in left.values()
+        )
 
     def _rectangles(self, here: Array, there: Array) -> Rectangles:
         """Return where boxes keep a vehicle away on a way from ``here`` to ``there`` (3,), m.

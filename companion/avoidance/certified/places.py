@@ -23,7 +23,10 @@ _ROUNDING_M = 1e-6
 
 
 class Places:
-    """Places of the vehicle ``own`` (system id), beside what its ``sources`` and ``told`` goals say."""
+    """Places of the vehicle ``own`` (system id), beside what its constraint ``sources`` say.
+
+    ``told``: the goals of the others.
+    """
 
     def __init__(
         self, config: CompanionConfig, own: int, told: ToldGoals, sources: ConstraintSources
@@ -88,7 +91,7 @@ class Places:
     def _beside_goal(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
         """Return ``goal`` (3,), m, or the nearest free place if a vehicle that said farewell covers it.
 
-        The goals of those that ask for room are not free: nobody is kept from a goal by one that has none.
+        The goals of those that ask for room are not free, unless there is no other place.
         """
         left = agreements.left
         if not left:

@@ -122,7 +122,10 @@ class PlanGoals:
         subgoal = self._subgoal(now, epoch, rest, aim)
         goal = subgoal.place
         if room is not None:
-            asked = room.asked(rest, goal, closed=self._closed(epoch, destination))
+            occupied = self._deadlock_turn.stalled and self._sources.occupied(
+                epoch, destination, self._agreements
+            )
+            asked = room.asked(rest, goal, closed=self._closed, occupied=occupied)
         if not self._gives_way:
             tells = anticipates or asked is not None
             self._told.tell(destination if tells else None, room=asked)
@@ -183,16 +186,11 @@ class PlanGoals:
             stalled=stalled,
         )
 
-    def _closed(self, epoch: int, goal: Array) -> bool:
-        """Return whether those that rest from ``epoch`` (µs) on leave no way to ``goal`` (3,), m.
-
-        One that rests on it because its own goal is covered leaves it.
-        """
-        if self._detour.through or (self._space is not None and self._space.narrow):
-            return True
-        if self._way is not None and self._way.closed:
-            return True
-        return self._deadlock_turn.stalled and self._sources.displaced(epoch, goal, self._agreements)
+    @property
+    def _closed(self) -> bool:
+        """Whether those that rest leave no way to the goal."""
+        narrow = self._space is not None and self._space.narrow
+        return narrow or self._detour.through or (self._way is not None and self._way.closed)
 
     def _begun(self) -> tuple[int, int]:
         """Return how many detours and how many ways around fixed obstacles were begun."""

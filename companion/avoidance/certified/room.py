@@ -5,7 +5,9 @@ tells its goal and the next place on its way (``told_goals.py``). A vehicle that
 aside while its goal is in the corridor from the end of the other's plan to that place, and returns
 afterwards. Where those that rest leave it no place beside the corridor, it asks for room, too, with a rank
 one higher. A vehicle stands aside for lower ranks than its own, and for a lower id of the same rank; so no
-two wait for each other. Only destinations change; planes keep all distances.
+two wait for each other. One on whose goal another one rests near a landed vehicle asks with the highest rank:
+for it nobody leaves a goal, but a vehicle leaves the free place beside its own covered goal (``places.py``).
+Only destinations change; planes keep all distances.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ _LONG = 2.0
 _PART = 0.3
 """Distance of the discs that make a corridor, in least distances of plans."""
 _MOST_RANK = 7
-"""Rank from which on nobody stands aside."""
+"""Rank from which on nobody at a goal stands aside: a vehicle at a free place beside its goal does."""
 
 
 class _Asking(NamedTuple):
@@ -55,7 +57,7 @@ class Room:
         self._low, self._high = np.array(limits.box_min[:2]), np.array(limits.box_max[:2])
         self._planar, self._downwash = config.planar, config.field.downwash
         self._goal: Array | None = None
-        self._reached = self._there = self._asks = False
+        self._reached = self._there = self._asks = self._occupied = False
         self._aside: Array | None = None
         self._rank = 0
         self._closed_at: Array = np.zeros(3)
@@ -79,13 +81,15 @@ class Room:
         self.moved = before is not self._aside
         return goal if self._aside is None else self._aside
 
-    def asked(self, rest: Array, subgoal: Array, *, closed: bool) -> WireRoom | None:
+    def asked(self, rest: Array, subgoal: Array, *, closed: bool, occupied: bool = False) -> WireRoom | None:
         """Return the room that the vehicle asks for from ``rest`` to its ``subgoal`` (3,), m; None for none.
 
         ``closed``: those that rest leave no way to its goal. It asks until they do and the end of its plan
-        has gone on by the length of a corridor, or is at the goal.
+        has gone on by the length of a corridor, or is at the goal. ``occupied``: one of them rests on the
+        goal, perhaps beside its own goal, which a landed vehicle covers: only such a vehicle is asked.
         """
-        if closed and not self._there and self._aside is None:
+        if (closed or occupied) and not self._there and self._aside is None:
+            self._occupied = not closed and (self._occupied or not self._asks)
             self._asks, self._closed_at = True, rest
         longest = _LONG * self._sources.between
         self._asks &= float(np.linalg.norm(rest - self._closed_at)) < longest
@@ -93,7 +97,8 @@ class Room:
             return None
         if not self._asks and self._aside is None:
             return None
-        return room_to(rest + limit(subgoal - rest, longest), self._rank)
+        rank = _MOST_RANK if self._aside is None and self._occupied else self._rank
+        return room_to(rest + limit(subgoal - rest, longest), rank)
 
     def _place(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array | None:
         """Return the place to stand at while ``goal`` (3,), m, is in a corridor; None if it is in none."""
@@ -128,7 +133,8 @@ class Room:
 
         Not those whose goal is so near to the own ``goal`` (3,), m, that both cannot be reached.
         """
-        mine = (self._rank if self._asks or self._rank else inf, self._own)
+        asks = self._asks and not self._occupied
+        mine = (self._rank if asks or self._rank else inf, self._own)
         found = []
         for system, one in self._told.recent(now).items():
             if one.room is None or one.room.rank >= _MOST_RANK or (one.room.rank, system) >= mine:

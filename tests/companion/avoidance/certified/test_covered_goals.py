@@ -1,4 +1,4 @@
-"""A vehicle beside its covered goal gives up its place for one whose goal it covers."""
+"""A vehicle whose goal is covered leaves the goal of another one that asks for room."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
 from companion.avoidance.certified.peer_plans import stored
 from companion.avoidance.certified.places import Places
 from companion.avoidance.certified.plan_goals import PlanGoals
+from companion.avoidance.certified.room import Room
 from companion.avoidance.certified.told_goals import ToldGoals
 from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
 from companion.config.certified import DeadlockConfig
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Source, Tunnel
-from mavlink_bridge.wire.goal import goal_at, pack, room_to, unpack
+from mavlink_bridge.wire.goal import WireRoom, goal_at, pack, room_to, unpack
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
 
 ORIGIN, EAST, UP = np.array([0.0, 0.0, 5.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -72,13 +73,17 @@ def test_in_space_a_goal_high_above_the_place_leaves_it_free(planar: bool) -> No
     assert bool((vehicle.place(0) == nearest).all()) is not planar
 
 
-def asks(others: dict[int, Array], landed: Array, *, planar: bool) -> bool:
-    """Whether a vehicle whose goal is the origin asks for room; it makes no progress.
+def told(
+    others: dict[int, Array], landed: Array, *, planar: bool, stalled: bool = True, **limits: Any
+) -> WireRoom | None:
+    """The room that a vehicle asks for whose goal is the origin; None: none.
 
-    Others rest at ``others`` (3,), m, by system id, and one has ``landed`` (3,).
+    Others rest at ``others`` (3,), m, by system id, and one has ``landed`` (3,). ``stalled``: the vehicle
+    makes no progress.
     """
-    config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
-    sources, told = ConstraintSources(config, STEPS), ToldGoals(Source(1, 1), 7)
+    document = {"avoidance": "certified", "planar": planar, "limits": limits}
+    config = CompanionConfig.model_validate(document)
+    sources, goals_told = ConstraintSources(config, STEPS), ToldGoals(Source(1, 1), 7)
     rest = ORIGIN - 0.6 * sources.between * EAST
     agreements: Any = SimpleNamespace(
         left={9: stored(at_rest(EPOCH, DT, STEPS, landed, 7))},
@@ -89,22 +94,59 @@ def asks(others: dict[int, Array], landed: Array, *, planar: bool) -> bool:
         age=lambda *_: 0.0,
     )
     turn = DeadlockTurn(DeadlockConfig(), 1.0)
-    goals = PlanGoals(config, Source(1, 1), agreements, sources, told, turn, 1.0)
+    goals = PlanGoals(config, Source(1, 1), agreements, sources, goals_told, turn, 1.0)
     goals.prepare(5.0)
     own, start = np.tile(rest, (STEPS, 3, 1)), at_rest(EPOCH, DT, STEPS, rest, 7)
     against = Pushes(np.array([[-50.0, 0.0, 0.0]]), np.zeros((1, 3)))
-    while not turn.stalled:
+    while stalled and not turn.stalled:
         turn.learn(rest, ORIGIN, against, 1.0, 0.2)
     goals.chosen(EPOCH, EPOCH, start, own, ORIGIN, given=True, moving=False)
-    return any(isinstance(one, Tunnel) and unpack(one.payload).room is not None for one in told.messages())
+    messages = [one for one in goals_told.messages() if isinstance(one, Tunnel)]
+    return unpack(messages[0].payload).room if messages else None
+
+
+BESIDE, LANDED = ORIGIN + 0.8 * EAST, ORIGIN + 2.0 * EAST
 
 
 @pytest.mark.parametrize("planar", [True, False])
 def test_a_vehicle_asks_for_room_while_another_one_rests_on_its_goal_beside_a_landed_one(
     planar: bool,
 ) -> None:
-    beside, landed = ORIGIN + 0.8 * EAST, ORIGIN + 2.0 * EAST
-    assert asks({2: beside}, landed, planar=planar)
-    assert not asks({2: ORIGIN + 30.0 * EAST}, landed, planar=planar)
-    # Of two goals that are too near to each other for both to be reached none is given up.
-    assert not asks({2: beside}, ORIGIN + 30.0 * EAST, planar=planar)
+    room = told({2: BESIDE}, LANDED, planar=planar)
+    assert room is not None
+    # Nobody leaves a goal for that.
+    assert room.rank == 7
+    assert told({2: BESIDE}, LANDED, planar=planar, stalled=False) is None
+    assert told({2: ORIGIN + 30.0 * EAST}, LANDED, planar=planar) is None
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_vehicle_that_rests_on_a_goal_far_from_landed_ones_is_not_asked_to_leave(planar: bool) -> None:
+    assert told({2: BESIDE}, ORIGIN + 30.0 * EAST, planar=planar) is None
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_in_space_a_vehicle_that_rests_high_above_a_goal_is_not_on_it(planar: bool) -> None:
+    above = BESIDE + 2.5 * UP
+    assert (told({2: above}, LANDED, planar=planar) is None) is not planar
+
+
+def test_a_landed_vehicle_on_the_goal_is_not_asked_to_leave() -> None:
+    """There is no free place beside it in the box, so the goal stays the destination."""
+    box = {"box_min": (-4.0, -1.0, 0.5), "box_max": (1.0, 1.0, 9.0)}
+    assert told({}, BESIDE, planar=True, **box) is None
+
+
+@pytest.mark.parametrize("closed_first", [True, False])
+def test_while_a_closed_way_is_the_cause_the_rank_is_that_of_a_closed_way(closed_first: bool) -> None:
+    config = CompanionConfig.model_validate({"avoidance": "certified", "planar": True})
+    goals_told, sources = ToldGoals(Source(1, 1), 7), ConstraintSources(config, STEPS)
+    room = Room(config, 1, goals_told, sources)
+    ranks = []
+    for closed in (closed_first, not closed_first, False):
+        agreements: Any = SimpleNamespace(left={}, columns=(), resting=lambda *_: {}, ends=dict)
+        room.destination(0, 0, ORIGIN - EAST, ORIGIN, agreements)
+        asked = room.asked(ORIGIN - EAST, ORIGIN, closed=closed, occupied=True)
+        assert asked is not None
+        ranks.append(asked.rank)
+    assert ranks == ([0, 0, 0] if closed_first else [7, 0, 0])
