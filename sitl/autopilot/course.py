@@ -28,8 +28,8 @@ from sitl.vehicle.multirotor import Reference, VehicleState
 
 _JERK_TIME_CONSTANT: Final = 0.1
 """Time constant of the jerk that is derived from a stream of accelerations (s)."""
-_STEP: Final = 0.5
-"""Change of the acceleration at once (m/s²) from which on it is a step: it adds no jerk."""
+_STEP: Final = 3.0
+"""Change of the acceleration at once (m/s²) from which on it is only a step, and no jerk."""
 _YAW_ACCELERATION_TIME_CONSTANT: Final = 0.03
 """Time constant of the yaw acceleration that is derived from a stream of yaw rates (s)."""
 
@@ -40,9 +40,9 @@ class Course:
     Set-points carry neither jerk nor yaw acceleration. Without jerk the controller does not anticipate
     rotation of the thrust axis and lags in curves; without yaw acceleration a weak yaw control lags in every
     turn. Both are derived from the motion, low-pass filtered so that a step does not cause a jolt. A step of
-    the acceleration, as at each knot of a plan, adds no jerk: the requested thrust has changed already, and
-    with a jerk in addition the thrust axis would turn too far. With steps of 4 m/s² the tilt was up to twice
-    the requested one.
+    the acceleration, as at each knot of a plan, counts the less as jerk the larger it is: the requested
+    thrust has changed with it. After a small step a jerk in addition makes up for the lag of the attitude; if
+    all of a step of 4 m/s² counted, the rotors would reach their limits and the thrust axis turn too far.
     """
 
     def __init__(self, guidance: Guidance, origin: Origin) -> None:
@@ -101,7 +101,8 @@ class Course:
             self._filter_gains = elapsed, gain, yaw_gain
         rate = 1e6 / elapsed
         (x, y, z), (u, v, w), (a, b, c) = self._jerk, acceleration, self._acceleration
-        rising = rate if math.dist(acceleration, self._acceleration) < _STEP else 0.0
+        step = math.dist(acceleration, self._acceleration) / _STEP
+        rising = rate * max(0.0, 1.0 - step * step)
         self._jerk = (
             x + gain * (rising * (u - a) - x),
             y + gain * (rising * (v - b) - y),

@@ -50,7 +50,7 @@ def test_a_jump_is_no_jolt(step):
 
 
 @pytest.mark.parametrize("step", [2_500, 20_000, 1_000_000])
-def test_a_step_of_the_acceleration_adds_no_jerk(step):
+def test_a_large_step_of_the_acceleration_is_no_jerk(step):
     guidance = led()
     course = Course(guidance, ORIGIN)
     course.next(step)
