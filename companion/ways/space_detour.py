@@ -94,6 +94,8 @@ class SpaceDetour:
         """Whether the last search found no way."""
         self.begun = 0
         """Number of ways that were begun."""
+        self.straight = False
+        """Whether the line to the goal was free at the last call while the vehicle made no progress."""
         self._progress = _Progress(between)
 
     def prepare(self) -> None:
@@ -124,6 +126,7 @@ class SpaceDetour:
 
         ``stalled``: there is no progress. ``others`` returns those that rest. Without a way it is the goal.
         """
+        self.straight = False
         if self._goal is not None and float(np.abs(goal - self._goal).max()) > _MOVED_M:
             self._forget()
         self._goal = goal
@@ -135,6 +138,7 @@ class SpaceDetour:
         least = balls._replace(radii=balls.radii + kept).without(rest).without(goal)
         if self._free(least, rest, goal[None])[0]:
             self._forget()
+            self.straight = stalled
             return Subgoal(goal, 0.0)
         # A way that ends beside a goal that has moved a little does not lead there.
         ends = stalled and self._way is not None and len(self._way) == 1

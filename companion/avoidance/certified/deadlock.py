@@ -33,6 +33,8 @@ Vector = tuple[float, float, float]
 _MIN_PULL_DISTANCE_M = 0.5
 """Distance of the goal below which the pull of the cost counts as constant."""
 _MIN_GAIN_M = 0.05
+_IN_VAIN_S = 5.0
+"""Time (s) without progress at the full turn after which the turn has been in vain."""
 _REACHED_M = 0.1
 """Progress: the rest point is nearer to the goal than ``_REACHED_M``, or ``_MIN_GAIN_M`` nearer than ever."""
 
@@ -85,8 +87,23 @@ class DeadlockTurn:
     @property
     def stalled(self) -> bool:
         """Whether there was no progress although the goal was turned by ``bend_more``."""
+        return self._waited > self._full_after
+
+    @property
+    def _full_after(self) -> float:
+        """Time (s) without progress after which the turn may be ``bend_more``."""
         config = self._config
-        return self._waited > config.patience + (config.bend_more - config.bend) / config.slow
+        return config.patience + (config.bend_more - config.bend) / config.slow
+
+    def give_up(self) -> None:
+        """Begin anew with the goal straight ahead, if the full turn has been in vain.
+
+        The turn lasts as long as planes push the plan back from the turned goal. That may be those of
+        vehicles that rest on the far side, although the way to the goal is free.
+        """
+        if self._waited > self._full_after + _IN_VAIN_S:
+            self.angle = self._waited = 0.0
+            self.restart()
 
     def restart(self) -> None:
         """Measure progress anew, because the way to the goal is another one."""

@@ -41,6 +41,8 @@ class Detour:
         self._looking: Generator[None, None, tuple[int, Array] | None] | None = None
         self.begun = 0
         """Number of ways that were begun."""
+        self.straight = False
+        """Whether the line to the goal was free at the last call while the vehicle made no progress."""
 
     def towards(
         self, now: int, rest: Array, goal: Array, discs: Callable[[], Sequence[Discs]], *, stalled: bool
@@ -50,6 +52,7 @@ class Detour:
         ``stalled``: there is no progress. ``discs`` returns what a way must avoid, in order of preference.
         Without a way, the sub-goal is the goal.
         """
+        self.straight = False
         # A search that has begun is ended: a way that was blocked is searched anew without a stall.
         if self._way is None and self._looking is None and not stalled:
             return Subgoal(goal, 0.0)
@@ -57,6 +60,7 @@ class Detour:
         here, there = rest[:2], goal[:2]
         if free(here, there[None], without(here, without(there, choices[0])))[0]:
             self._way = self._looking = None
+            self.straight = stalled
             return Subgoal(goal, 0.0)
         kept = self._still_free(here, there, choices[min(self._choice, len(choices) - 1)])
         # One that leads through what rests is searched anew where there is no progress along it.
@@ -75,6 +79,7 @@ class Detour:
     def forget(self) -> None:
         """Drop the way and the search of one."""
         self._way = self._looking = None
+        self.straight = False
 
     def _search(self, now: int, here: Array, there: Array, choices: Sequence[Discs]) -> None:
         if self._looking is None:

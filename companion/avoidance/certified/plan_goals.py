@@ -161,6 +161,8 @@ class PlanGoals:
         if in_lane is not None:
             return in_lane
         subgoal = self._past_others(now, epoch, rest, goal.place)
+        if self._detour.straight or (self._space is not None and self._space.straight):
+            self._deadlock_turn.give_up()
         if self._begun() != begun:
             self._restart(rest, counts=stalled or (way is not None and way.goes_round))
         return Subgoal(subgoal.place, subgoal.beyond + goal.beyond)
