@@ -28,7 +28,7 @@ from sitl.vehicle.multirotor import Reference, VehicleState
 
 _JERK_TIME_CONSTANT: Final = 0.1
 """Time constant of the jerk that is derived from a stream of accelerations (s)."""
-_STEP: Final = 3.0
+_STEP: Final = 4.0
 """Change of the acceleration at once (m/s²) from which on it is only a step, and no jerk."""
 _YAW_ACCELERATION_TIME_CONSTANT: Final = 0.03
 """Time constant of the yaw acceleration that is derived from a stream of yaw rates (s)."""
