@@ -29,8 +29,9 @@ _Place = tuple[int, int, int]
 class WireRoom(NamedTuple):
     """Room that a vehicle asks for, to go on to ``next_place`` (mm, fleet-local ENU).
 
-    ``rank``: 0 if it is on the way to its goal; one more than that of the vehicle for which it makes room. 7
-    if another vehicle rests on its goal, perhaps beside its own.
+    ``rank``: 0 if it is on the way to its goal; one more than that of the vehicle for which it makes room.
+    From 7 on no vehicle leaves its goal; one on whose goal another one rests near a landed vehicle asks with
+    7.
     """
 
     next_place: _Place

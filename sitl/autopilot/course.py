@@ -29,7 +29,7 @@ from sitl.vehicle.multirotor import Reference, VehicleState
 _JERK_TIME_CONSTANT: Final = 0.1
 """Time constant of the jerk that is derived from a stream of accelerations (s)."""
 _STEP: Final = 4.0
-"""Change of the acceleration at once (m/s²) from which on it is only a step, and no jerk."""
+"""Change of the acceleration between two references (m/s²) from which on none of it counts as jerk."""
 _YAW_ACCELERATION_TIME_CONSTANT: Final = 0.03
 """Time constant of the yaw acceleration that is derived from a stream of yaw rates (s)."""
 
@@ -39,10 +39,10 @@ class Course:
 
     Set-points carry neither jerk nor yaw acceleration. Without jerk the controller does not anticipate
     rotation of the thrust axis and lags in curves; without yaw acceleration a weak yaw control lags in every
-    turn. Both are derived from the motion, low-pass filtered so that a step does not cause a jolt. A step of
-    the acceleration, as at each knot of a plan, counts the less as jerk the larger it is: the requested
-    thrust has changed with it. After a small step a jerk in addition makes up for the lag of the attitude; if
-    all of a step of 4 m/s² counted, the rotors would reach their limits and the thrust axis turn too far.
+    turn. Both are derived from the motion, low-pass filtered so that a step does not cause a jolt. The share
+    of a step of the acceleration that counts as jerk falls with its square, to none at 4 m/s²: the step
+    itself changes the requested thrust. For a small step the jerk compensates the lag of the attitude; a
+    large one counted in full drives the rotors to their limits and tilts the vehicle too far.
     """
 
     def __init__(self, guidance: Guidance, origin: Origin) -> None:

@@ -38,7 +38,7 @@ _RESTED_US, _AT_REST_M = 2_000_000, 0.5
 Vehicles that jostle for room rest for a shorter time, and the turn of the goal resolves that.
 """
 _NEAR = 2.0
-"""A vehicle that rests nearer to a landed one, in least distances from that, may rest beside its own goal."""
+"""Distance from a landed vehicle, in least distances from it, below which one rests because of it."""
 BESIDE_M = 0.05
 """Distance (m) of a way from what plans must keep clear of."""
 _AROUND_M, _MOST_BOXES = 20.0, 8
@@ -294,7 +294,7 @@ class ConstraintSources:
     def occupied(self, epoch: int, goal: Array, agreements: Agreements) -> bool:
         """Return whether a vehicle rests on ``goal`` (3,), m, from ``epoch`` (µs) on, near a landed one.
 
-        It is nearer to ``goal`` than plans keep. The landed vehicle probably covers its own goal.
+        It is nearer to ``goal`` than plans keep. The landed vehicle may cover the goal of that one.
         """
         left = agreements.left
         resting = agreements.resting(epoch - _RESTED_US, _AT_REST_M) if left else {}

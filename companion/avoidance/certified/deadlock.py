@@ -4,7 +4,8 @@ A deadlock begins at the rest points, where the plans end, before the vehicles t
 vehicles meet in the middle: after a second their rest points lie on a small circle, the planes let each rest
 point move outward only, and the plan that stays is optimal. If a vehicle's planes push its plan back while
 its rest point makes no progress, the goal is turned aside about the vehicle, for all vehicles to the same
-side, and back again when the push is gone. The turn changes only the cost, and depends only on the vehicle's
+side, and back again when the push is gone, or when it brought no progress and the line to the goal is free.
+The turn changes only the cost, and depends only on the vehicle's
 own solutions. The constraints that certify separation do not change.
 
 The push is F = Σ λ c, the sum of the planes' normals c times the multipliers λ of their rows. The blocking is
@@ -33,10 +34,10 @@ Vector = tuple[float, float, float]
 _MIN_PULL_DISTANCE_M = 0.5
 """Distance of the goal below which the pull of the cost counts as constant."""
 _MIN_GAIN_M = 0.05
-_IN_VAIN_S = 5.0
-"""Time (s) without progress at the full turn after which the turn has been in vain."""
 _REACHED_M = 0.1
 """Progress: the rest point is nearer to the goal than ``_REACHED_M``, or ``_MIN_GAIN_M`` nearer than ever."""
+_IN_VAIN_S = 5.0
+"""Time (s) without progress after the turn may be ``bend_more``, after which it is given up."""
 
 
 class Pushes(NamedTuple):
@@ -96,10 +97,10 @@ class DeadlockTurn:
         return config.patience + (config.bend_more - config.bend) / config.slow
 
     def give_up(self) -> None:
-        """Begin anew with the goal straight ahead, if the full turn has been in vain.
+        """End the turn and measure progress anew, if there was none for ``_IN_VAIN_S`` after it was full.
 
-        The turn lasts as long as planes push the plan back from the turned goal. That may be those of
-        vehicles that rest on the far side, although the way to the goal is free.
+        For a free line to the goal: vehicles that rest behind may push the plan back from the turned goal for
+        ever.
         """
         if self._waited > self._full_after + _IN_VAIN_S:
             self.angle = self._waited = 0.0

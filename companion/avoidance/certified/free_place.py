@@ -2,8 +2,7 @@
 
 A vehicle that has said farewell stays at the end of its last plan, for ever. A goal nearer to that place than
 plans keep is covered. A vehicle that aims for it all the same is pushed back without end, and turns aside
-again and again. So it aims for the nearest place at the height of its goal that is free of what stays, and
-of the goals of vehicles that ask for room.
+again and again. So it aims for the nearest place at the height of its goal that is free of what stays.
 """
 
 from __future__ import annotations

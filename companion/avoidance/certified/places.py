@@ -23,9 +23,9 @@ _ROUNDING_M = 1e-6
 
 
 class Places:
-    """Places of the vehicle ``own`` (system id), beside what its constraint ``sources`` say.
+    """Chooses where plans of the vehicle ``own`` (system id) end.
 
-    ``told``: the goals of the others.
+    ``sources``: what constrains them; ``told``: goals of the others.
     """
 
     def __init__(

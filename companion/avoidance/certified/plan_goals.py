@@ -161,7 +161,7 @@ class PlanGoals:
         if in_lane is not None:
             return in_lane
         subgoal = self._past_others(now, epoch, rest, goal.place)
-        if self._detour.straight or (self._space is not None and self._space.straight):
+        if self._straight:
             self._deadlock_turn.give_up()
         if self._begun() != begun:
             self._restart(rest, counts=stalled or (way is not None and way.goes_round))
@@ -187,6 +187,11 @@ class PlanGoals:
             lambda: self._sources.resting(epoch, rest, goal, self._agreements),
             stalled=stalled,
         )
+
+    @property
+    def _straight(self) -> bool:
+        """Whether the line to the goal, or to the next place of the way, is free without progress."""
+        return self._detour.straight or (self._space is not None and self._space.straight)
 
     @property
     def _closed(self) -> bool:

@@ -35,7 +35,7 @@ _LONG = 2.0
 _PART = 0.3
 """Distance of the discs that make a corridor, in least distances of plans."""
 _MOST_RANK = 7
-"""Rank from which on nobody at a goal stands aside: a vehicle at a free place beside its goal does."""
+"""Rank from which on no vehicle leaves its goal. Free places (``places.py``) avoid goals of all ranks."""
 
 
 class _Asking(NamedTuple):
@@ -81,16 +81,17 @@ class Room:
         self.moved = before is not self._aside
         return goal if self._aside is None else self._aside
 
-    def asked(self, rest: Array, subgoal: Array, *, closed: bool, occupied: bool = False) -> WireRoom | None:
+    def asked(self, rest: Array, subgoal: Array, *, closed: bool, occupied: bool) -> WireRoom | None:
         """Return the room that the vehicle asks for from ``rest`` to its ``subgoal`` (3,), m; None for none.
 
         ``closed``: those that rest leave no way to its goal. It asks until they do and the end of its plan
-        has gone on by the length of a corridor, or is at the goal. ``occupied``: one of them rests on the
-        goal, perhaps beside its own goal, which a landed vehicle covers: only such a vehicle is asked.
+        has gone on by the length of a corridor, or is at the goal. ``occupied``: one rests on the goal near a
+        landed vehicle. Without ``closed`` it asks with the highest rank, for which no vehicle leaves its
+        goal.
         """
-        if (closed or occupied) and not self._there and self._aside is None:
-            self._occupied = not closed and (self._occupied or not self._asks)
-            self._asks, self._closed_at = True, rest
+        only = occupied and not closed and (self._occupied or not self._asks)
+        if (closed or only) and not self._there and self._aside is None:
+            self._occupied, self._asks, self._closed_at = only, True, rest
         longest = _LONG * self._sources.between
         self._asks &= float(np.linalg.norm(rest - self._closed_at)) < longest
         if self._aside is not None and self._rank == 0:

@@ -130,7 +130,7 @@ def test_a_field_of_view_tilts_with_the_vehicle_in_live_pictures_and_in_those_fr
     # Each live picture is one of the log's: places to what messages resolve, attitudes to float32.
     apart = np.abs(shown[:, None] - rows[None])
     matched = (apart[..., :3].max(axis=2) < 0.03) & (apart[..., 3:].max(axis=2) < 1e-3)
-    # The flight may end while the message about the last image is on its way.
+    # The flight may end before the message about the last image is logged.
     last = (shown == live[-1][:7]).all(axis=1)
     assert (matched.any(axis=1) | last).all()
     # On a level vehicle the camera's right side is level: that of a quaternion (w, x, y, z) points down by

@@ -35,7 +35,7 @@ def test_a_vehicle_in_a_gap_that_is_too_narrow_asks_for_room() -> None:
 
 @pytest.mark.slow
 def test_a_vehicle_beside_its_covered_goal_leaves_the_goal_of_another_one() -> None:
-    """A landed vehicle covers the goal of A. A rests at the nearest free place, which is on the goal of B."""
+    """A landed vehicle covers the goal of A. A rests at the nearest free place, too near to the goal of B."""
     summary = flown(60468)
     assert summary["covered_goals"] == 1
     assert summary["others_converge_s"] is not None

@@ -42,20 +42,33 @@ def test_a_jump_is_no_jolt(step):
     guidance = led()
     course = Course(guidance, ORIGIN)
     course.next(step)
-    guidance.motion = (ZERO, ZERO, (0.4, 0.0, 0.0))
+    guidance.motion = (ZERO, ZERO, (1.0, 0.0, 0.0))
     guidance.yaw_rate = 1.0
     reference = course.next(step)
-    assert 0.0 < np.linalg.norm(reference.jerk) <= 4.0
+    assert 0.0 < np.linalg.norm(reference.jerk) <= 10.0
     assert 0.0 < reference.yaw_acceleration <= 1.0 / 0.03
 
 
-@pytest.mark.parametrize("step", [2_500, 20_000, 1_000_000])
-def test_a_large_step_of_the_acceleration_is_no_jerk(step):
+def jerk_after(change, step):
+    """The jerk (m/s³) after a change of the acceleration (m/s²) in one step."""
     guidance = led()
     course = Course(guidance, ORIGIN)
     course.next(step)
-    guidance.motion = (ZERO, ZERO, (-4.0, 0.0, 0.0))
-    assert course.next(step).jerk.tolist() == [0.0, 0.0, 0.0]
+    guidance.motion = (ZERO, ZERO, (-change, 0.0, 0.0))
+    return float(np.linalg.norm(course.next(step).jerk))
+
+
+@pytest.mark.parametrize("step", [2_500, 20_000, 1_000_000])
+@pytest.mark.parametrize("change", [4.0, 7.0])
+def test_a_large_step_of_the_acceleration_is_no_jerk(step, change):
+    assert jerk_after(change, step) == 0.0
+
+
+@pytest.mark.parametrize("step", [2_500, 20_000, 1_000_000])
+def test_the_share_of_a_step_that_is_jerk_falls_with_its_size(step):
+    shares = [jerk_after(change, step) / change for change in (0.5, 1.0, 2.0, 3.0)]
+    assert (np.diff(shares) < 0.0).all()
+    assert shares[-1] > 0.0
 
 
 def test_after_a_pause_it_begins_anew():

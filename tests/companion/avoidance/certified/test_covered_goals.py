@@ -137,16 +137,30 @@ def test_a_landed_vehicle_on_the_goal_is_not_asked_to_leave() -> None:
     assert told({}, BESIDE, planar=True, **box) is None
 
 
-@pytest.mark.parametrize("closed_first", [True, False])
-def test_while_a_closed_way_is_the_cause_the_rank_is_that_of_a_closed_way(closed_first: bool) -> None:
-    config = CompanionConfig.model_validate({"avoidance": "certified", "planar": True})
-    goals_told, sources = ToldGoals(Source(1, 1), 7), ConstraintSources(config, STEPS)
-    room = Room(config, 1, goals_told, sources)
-    ranks = []
-    for closed in (closed_first, not closed_first, False):
+class Asking:
+    """A vehicle on the way to its goal, which is the origin."""
+
+    def __init__(self) -> None:
+        config = CompanionConfig.model_validate({"avoidance": "certified", "planar": True})
+        sources = ConstraintSources(config, STEPS)
+        self.d = sources.between
+        self._room = Room(config, 1, ToldGoals(Source(1, 1), 7), sources)
+
+    def rank(self, before: float, *, closed: bool = False) -> int | None:
+        """The rank with which it asks, ``before`` (m) its goal, on which one rests; None: none."""
         agreements: Any = SimpleNamespace(left={}, columns=(), resting=lambda *_: {}, ends=dict)
-        room.destination(0, 0, ORIGIN - EAST, ORIGIN, agreements)
-        asked = room.asked(ORIGIN - EAST, ORIGIN, closed=closed, occupied=True)
-        assert asked is not None
-        ranks.append(asked.rank)
-    assert ranks == ([0, 0, 0] if closed_first else [7, 0, 0])
+        rest = ORIGIN - before * EAST
+        self._room.destination(0, 0, rest, ORIGIN, agreements)
+        asked = self._room.asked(rest, ORIGIN, closed=closed, occupied=True)
+        return None if asked is None else asked.rank
+
+
+def test_while_a_closed_way_is_the_cause_the_rank_is_that_of_a_closed_way() -> None:
+    vehicle = Asking()
+    assert [vehicle.rank(8.0 * vehicle.d, closed=closed) for closed in (False, True, False)] == [7, 0, 0]
+
+
+def test_once_it_has_gone_on_from_a_closed_way_only_the_occupied_goal_is_the_cause() -> None:
+    vehicle = Asking()
+    ranks = [vehicle.rank(before * vehicle.d, closed=before == 8.0) for before in (8.0, 7.0, 5.5, 5.0)]
+    assert ranks == [0, 0, None, 7]

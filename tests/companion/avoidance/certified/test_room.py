@@ -109,7 +109,7 @@ class Standing:
 
     def asks(self, rest: Array, onwards: Array, *, closed: bool = False) -> WireRoom | None:
         """What it asks for on its way ``onwards`` (3,), m, from the end of its plan ``rest`` (3,), m."""
-        return self.room.asked(rest, onwards, closed=closed)
+        return self.room.asked(rest, onwards, closed=closed, occupied=False)
 
 
 ORIGIN, EAST = np.array([0.0, 0.0, 5.0]), np.array([1.0, 0.0, 0.0])
