@@ -334,7 +334,7 @@ def test_without_a_detour_and_without_room_it_stays_in_the_pocket(monkeypatch: p
     monkeypatch.setattr(
         Detour, "towards", lambda _self, _now, _rest, goal, _discs, *, stalled: Subgoal(goal, 0.0)
     )
-    monkeypatch.setattr(Room, "asked", lambda _self, _rest, _subgoal, *, closed: None)
+    monkeypatch.setattr(Room, "asked", lambda _self, _rest, _subgoal, *, closed, occupied: None)
     assert flown()[1] > 3.0
 
 
