@@ -28,7 +28,7 @@ from sitl.vehicle.multirotor import Reference, VehicleState
 
 _JERK_TIME_CONSTANT: Final = 0.1
 """Time constant of the jerk that is derived from a stream of accelerations (s)."""
-_STEP: Final = 4.0
+_STEP: Final = 5.0
 """Change of the acceleration between two references (m/s²) from which on none of it counts as jerk."""
 _YAW_ACCELERATION_TIME_CONSTANT: Final = 0.03
 """Time constant of the yaw acceleration that is derived from a stream of yaw rates (s)."""
@@ -40,7 +40,7 @@ class Course:
     Set-points carry neither jerk nor yaw acceleration. Without jerk the controller does not anticipate
     rotation of the thrust axis and lags in curves; without yaw acceleration a weak yaw control lags in every
     turn. Both are derived from the motion, low-pass filtered so that a step does not cause a jolt. The share
-    of a step of the acceleration that counts as jerk falls with its square, to none at 4 m/s²: the step
+    of a step of the acceleration that counts as jerk falls with its square, to none at 5 m/s²: the step
     itself changes the requested thrust. For a small step the jerk compensates the lag of the attitude; a
     large one counted in full drives the rotors to their limits and tilts the vehicle too far.
     """
