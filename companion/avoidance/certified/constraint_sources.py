@@ -257,8 +257,7 @@ class ConstraintSources:
         ]
         ends = [
             (end, self._config.planar or system in agreements.columns)
-            for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items()
-            if system not in agreements.left
+            for system, end in _ends_at_rest(epoch, agreements).items()
         ]
         ends += [(goal, self._config.planar) for goal in goals]
         vehicles = []
@@ -282,12 +281,11 @@ class ConstraintSources:
             places.append(last.controls[-1, 2])
             kept.append(self.from_last(last))
             flat.append(0.0)
-        for system, end in agreements.resting(epoch - _RESTED_US, _AT_REST_M).items():
-            if system not in agreements.left:
-                level = self._config.planar or system in agreements.columns
-                places.append(end)
-                kept.append(self.between)
-                flat.append(0.0 if level else 1.0 / self._config.field.downwash)
+        for system, end in _ends_at_rest(epoch, agreements).items():
+            level = self._config.planar or system in agreements.columns
+            places.append(end)
+            kept.append(self.between)
+            flat.append(0.0 if level else 1.0 / self._config.field.downwash)
         radii = np.array(kept) - self._from_surfaces
         return Balls(np.array(places).reshape(-1, 3), radii, np.array(flat))
 
@@ -297,11 +295,10 @@ class ConstraintSources:
         It is nearer to ``goal`` than plans keep. The landed vehicle may cover the goal of that one.
         """
         left = agreements.left
-        resting = agreements.resting(epoch - _RESTED_US, _AT_REST_M) if left else {}
-        ends = [end for system, end in resting.items() if system not in left]
-        return any(self._apart(end - goal) < self.between and self._near_landed(end, left) for end in ends)
+        ends = _ends_at_rest(epoch, agreements).values() if left else ()
+        return any(self.apart(end - goal) < self.between and self._near_landed(end, left) for end in ends)
 
-    def _apart(self, difference: Array) -> float:
+    def apart(self, difference: Array) -> float:
         """Return the distance (m) of two vehicles with a ``difference`` (3,), m, of places."""
         x, y, z = difference.tolist()
         return hypot(x, y, 0.0 if self._config.planar else z / self._config.field.downwash)
@@ -334,6 +331,15 @@ class ConstraintSources:
             return found
         nearest = np.argsort(found.distance(here[None, :2])[0], kind="stable")[:_MOST_BOXES]
         return Rectangles(*(part[nearest] for part in found))
+
+
+def _ends_at_rest(epoch: int, agreements: Agreements) -> dict[int, Array]:
+    """Return where the newest plans of vehicles that rest at ``epoch`` (µs) end (3,), m, by system id.
+
+    Landed vehicles are left out.
+    """
+    resting = agreements.resting(epoch - _RESTED_US, _AT_REST_M)
+    return {system: end for system, end in resting.items() if system not in agreements.left}
 
 
 def _discs(found: list[tuple[tuple[float, ...], float, float]]) -> Discs:

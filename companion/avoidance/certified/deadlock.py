@@ -5,8 +5,8 @@ vehicles meet in the middle: after a second their rest points lie on a small cir
 point move outward only, and the plan that stays is optimal. If a vehicle's planes push its plan back while
 its rest point makes no progress, the goal is turned aside about the vehicle, for all vehicles to the same
 side, and back again when the push is gone, or when it brought no progress and the line to the goal is free.
-The turn changes only the cost, and depends only on the vehicle's
-own solutions. The constraints that certify separation do not change.
+The turn changes only the cost, and depends only on the vehicle's own solutions. The constraints that certify
+separation do not change.
 
 The push is F = Σ λ c, the sum of the planes' normals c times the multipliers λ of their rows. The blocking is
 b = clip(−F·d / (G · L), 0, 1) · clip(1 − v_L/v, 0, 1). d and L are the direction and the distance of the goal

@@ -140,8 +140,7 @@ class Room:
         for system, one in self._told.recent(now).items():
             if one.room is None or one.room.rank >= _MOST_RANK or (one.room.rank, system) >= mine:
                 continue
-            off = self._off(one.position_m - goal)
-            if one.room.rank or float(off @ off) >= self._sources.between**2:
+            if one.room.rank or self._sources.apart(one.position_m - goal) >= self._sources.between:
                 found.append(_Asking(system, one.position_m, one.room))
         return sorted(found, key=lambda one: (one.room.rank, one.system))
 
@@ -165,11 +164,6 @@ class Room:
         square = (wide * between) ** 2 - above**2
         near = square > 0.0
         return Discs(centres[near, :2], np.sqrt(square[near]))
-
-    def _off(self, difference: Array) -> Array:
-        """Return ``difference`` (3,), m, as distances of vehicles are measured."""
-        result: Array = difference * np.array([1.0, 1.0, 0.0 if self._planar else 1.0 / self._downwash])
-        return result
 
 
 def _together(discs: Discs, corridors: list[Discs]) -> Discs:
