@@ -20,7 +20,8 @@ from companion.ways.way import Way
 from mavlink_bridge.messages import Source, Tunnel
 from mavlink_bridge.wire.goal import unpack
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 LIMITS = LimitsConfig(box_min=(-1.0, -1.3, 0.5), box_max=(4.5, 1.3, 2.5))
 SIDING = ["########", "        ", "#### ###"]

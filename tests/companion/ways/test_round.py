@@ -14,7 +14,8 @@ from companion.ways.clearance import Clearance
 from companion.ways.grid import grid
 from companion.ways.way import Way
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 LIMITS = LimitsConfig(box_min=(-5.0, -6.0, 0.5), box_max=(5.0, 6.0, 2.5), v_max=(1.0, 1.0, 1.0))
 START, GOAL = np.array([-3.0, -1.0, 1.0]), np.array([3.0, -1.0, 1.0])

@@ -21,7 +21,8 @@ from companion.ways.corners import lengths
 from companion.ways.space_detour import SpaceDetour
 from companion.ways.subgoal import Subgoal
 from tests.companion.avoidance.certified.plans import EPOCH, STEPS
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 LIMITS = LimitsConfig(
     u_max=(2.0, 2.0, 1.0), v_max=(1.0, 1.0, 1.0), box_min=(-1.5, -0.5, 0.5), box_max=(1.5, 0.5, 2.5)

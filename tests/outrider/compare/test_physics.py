@@ -24,7 +24,8 @@ from outrider.sweep.cells import task
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 from tests.outrider.compare.test_compare import flight
 
 SPAN = load(find("vehicles", "firefly"), VehicleConfig).span

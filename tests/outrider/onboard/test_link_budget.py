@@ -42,7 +42,9 @@ from outrider.onboard.link_budget import (
 from outrider.scenarios.fly_config import RADIOS, FleetOrigin, FlyConfig
 from sitl.config.autopilot import AutopilotConfig
 from sitl.node import Autopilot
-from tests.companion.avoidance.certified.swarm import EPOCH, Habits, Rough, Swarm
+from tests.companion.avoidance.certified.plans import EPOCH
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 from tests.companion.bench import TARGET, Bench, seen_at
 from tests.outrider.said import Run
 from tests.outrider.shipped import FIREFLY

@@ -9,7 +9,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from companion.values.horizon import Array
-from tests.companion.avoidance.certified.swarm import NEVER, Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import NEVER, Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 UNTIL = 5_000_000
 """µs of a run."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.draws import goals, starts
-from tests.companion.avoidance.certified.swarm import NEVER, Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import NEVER, Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 Kind = Literal["plain", "away", "late", "together", "restart", "quick"]
 _FAR = np.array([16.0, 0.0, 5.0])

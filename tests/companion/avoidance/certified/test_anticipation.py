@@ -25,7 +25,8 @@ from companion.values.bearings import turned
 from companion.values.horizon import Array
 from mavlink_bridge.wire.goal import goal_at, pack
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import FLEET, Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import FLEET, Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 CONFIG = AnticipationConfig()
 LEAST, SPEED, ACCELERATION = 1.25, 5.0, 2.0

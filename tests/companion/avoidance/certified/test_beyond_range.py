@@ -20,7 +20,7 @@ from mavlink_bridge.messages import GlobalPosition, Source
 from mavlink_bridge.wire.agreements import Entry, Statement
 from mavlink_bridge.wire.plan import pack
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
-from tests.companion.avoidance.certified.swarm import FLEET
+from tests.companion.avoidance.certified.rough import FLEET
 from tests.companion.avoidance.certified.two import (
     DISTANCES,
     FRAME,

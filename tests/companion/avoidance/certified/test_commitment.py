@@ -26,7 +26,7 @@ from companion.ways.way import Way
 from mavlink_bridge.messages import Message, Source, Tunnel
 from mavlink_bridge.wire.agreements import unpack
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
-from tests.companion.avoidance.certified.swarm import FLEET
+from tests.companion.avoidance.certified.rough import FLEET
 
 LENGTH = 400_000
 SHIFT = LENGTH // DT

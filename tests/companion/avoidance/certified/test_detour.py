@@ -18,7 +18,8 @@ from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.plans import EPOCH, STEPS
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 from tests.companion.ways.worlds import result
 
 LOW, HIGH = np.full(2, -30.0), np.full(2, 30.0)

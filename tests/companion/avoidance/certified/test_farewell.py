@@ -28,7 +28,7 @@ from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import pack, unpack
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
-from tests.companion.avoidance.certified.swarm import FLEET
+from tests.companion.avoidance.certified.rough import FLEET
 from tests.companion.bench import FLEET as BENCH
 from tests.companion.bench import Bench, only
 

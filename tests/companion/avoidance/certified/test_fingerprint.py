@@ -13,7 +13,8 @@ from companion.avoidance.certified.fingerprint import fingerprint, identity
 from companion.config import CompanionConfig
 from mavlink_bridge.frames import FleetFrame
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import FLEET, Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import FLEET, Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 SETTINGS: dict[str, Any] = {
     "avoidance": "certified",

@@ -8,7 +8,8 @@ import pytest
 from companion.avoidance.certified.free_place import covered, free_place
 from companion.avoidance.certified.visibility_graph import Discs, Rectangles
 from companion.values.horizon import Array
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 LOW, HIGH = np.full(2, -30.0), np.full(2, 30.0)
 

@@ -13,8 +13,9 @@ from companion.values.horizon import Array
 from mavlink_bridge.messages import Tunnel
 from mavlink_bridge.wire.agreements import Entry
 from mavlink_bridge.wire.plan import pack
-from tests.companion.avoidance.certified.swarm import EPOCH as BEGIN
-from tests.companion.avoidance.certified.swarm import TICK, Habits, Rough, Swarm, Vehicle
+from tests.companion.avoidance.certified.plans import EPOCH as BEGIN
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import TICK, Swarm
 from tests.companion.avoidance.certified.two import (
     LENGTH,
     NOW,
@@ -26,6 +27,7 @@ from tests.companion.avoidance.certified.two import (
     plan,
     statement,
 )
+from tests.companion.avoidance.certified.vehicle import Vehicle
 
 FIRST = Agreement(epoch(0), epoch(0))
 """Two that are at 0 and 4 m have agreed on it: the own plans stay below 1.5 m, half of d from the middle."""
@@ -143,8 +145,8 @@ class Aged(Late):
         super().__init__(starts, Rough(), [Habits()] * len(starts), 1)
         self.ages: dict[int, int] = {}
 
-    def _check(self, since: int, one: Vehicle) -> None:
-        super()._check(since, one)
+    def record(self, since: int, one: Vehicle) -> None:
+        super().record(since, one)
         kept = [epoch for two in one.flight.agreements.kept().values() for each in two for epoch in each]
         if since >= 3_000_000 and kept:
             age = BEGIN + since - min(kept)

@@ -10,7 +10,9 @@ from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.plan import unpack as unpack_plan
 from tests.companion.avoidance.certified.plans import DT, EPOCH
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm, Vehicle
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
+from tests.companion.avoidance.certified.vehicle import Vehicle
 
 LENGTH, UNTIL = DT, 8_000_000
 LATE = tuple((k * LENGTH + 120_000, (k + 1) * LENGTH + 180_000) for k in range(1, UNTIL // LENGTH, 2))

@@ -18,7 +18,7 @@ from companion.values.horizon import Array
 from companion.world import View, World
 from mavlink_bridge.messages import GlobalPosition, Source
 from tests.companion.avoidance.certified.plans import EPOCH, STEPS
-from tests.companion.avoidance.certified.swarm import FLEET
+from tests.companion.avoidance.certified.rough import FLEET
 
 OWN, OTHER = 11, 190
 NOW = EPOCH

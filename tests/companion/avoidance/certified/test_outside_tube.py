@@ -16,7 +16,7 @@ from companion.world import View, World
 from mavlink_bridge.messages import Message, Source, Tunnel
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE, Statement, unpack
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import FLEET
+from tests.companion.avoidance.certified.rough import FLEET
 from tests.companion.avoidance.certified.test_commitment import HERE, LENGTH, STEPS, Subgoal, commitment
 from tests.companion.avoidance.certified.test_commitment import standing as beside
 

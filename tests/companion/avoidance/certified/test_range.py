@@ -24,8 +24,10 @@ from companion.errors import CompanionError
 from companion.values.horizon import Array
 from mavlink_bridge.wire.agreements import Entry
 from mavlink_bridge.wire.plan import pack
+from tests.companion.avoidance.certified.flown import EXACT
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS, curves, random_plan
-from tests.companion.avoidance.certified.swarm import EXACT, NEVER, TICK, Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import NEVER, Habits, Rough
+from tests.companion.avoidance.certified.swarm import TICK, Swarm
 from tests.companion.avoidance.certified.two import (
     DISTANCES,
     FRAME,

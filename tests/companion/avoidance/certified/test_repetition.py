@@ -17,8 +17,9 @@ from companion.config.certified import CertifiedConfig
 from mavlink_bridge.messages import Tunnel
 from mavlink_bridge.wire.agreements import Entry, Statement
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE, pack
-from tests.companion.avoidance.certified.swarm import EPOCH as BEGIN
-from tests.companion.avoidance.certified.swarm import TICK, Habits, Rough, Swarm, Vehicle
+from tests.companion.avoidance.certified.plans import EPOCH as BEGIN
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import TICK, Swarm
 from tests.companion.avoidance.certified.two import (
     FRAME,
     LENGTH,
@@ -31,6 +32,7 @@ from tests.companion.avoidance.certified.two import (
     plan,
     statement,
 )
+from tests.companion.avoidance.certified.vehicle import Vehicle
 
 USUAL, SHORT = 50_000, 20_000
 CONFIG = CertifiedConfig(dt_us=LENGTH, epoch_us=LENGTH)
@@ -157,8 +159,8 @@ class Datagrams(Swarm):
         starts = [vehicle.place for vehicle in self.vehicles]
         self.run(until, lambda t, system: (self.goals if t >= self.BEGINS else starts)[system - 1])
 
-    def _check(self, since: int, one: Vehicle) -> None:
-        """Check nothing on the way, which takes the most time: ``test_swarm`` does."""
+    def record(self, since: int, one: Vehicle) -> None:
+        """Nothing, because this takes the most time; ``test_swarm`` checks what is agreed on the way."""
 
     def _carry(self, since: int, sender: Vehicle, message: Tunnel) -> None:
         if self._step.get(sender.system, (-1,))[0] != since:

@@ -16,7 +16,8 @@ from companion.values.horizon import Array
 from mavlink_bridge.messages import Source
 from mavlink_bridge.wire.goal import WireRoom, goal_at, pack, room_to
 from tests.companion.avoidance.certified.plans import EPOCH, STEPS
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 GOAL = np.array([9.0, 0.0, 5.0])
 ROUGH = Rough(delay=20_000)

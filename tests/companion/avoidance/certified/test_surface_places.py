@@ -22,7 +22,8 @@ from companion.surfaces.ellipsoid import Ellipsoid
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Source
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 REACH = 1.2
 CIRCLE = Circle(radius=4.0, height=5.0)

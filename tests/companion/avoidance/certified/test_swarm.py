@@ -18,7 +18,8 @@ from companion.values.horizon import Array
 from tests.companion.avoidance.certified.draws import UNTIL, goals, starts, swarms
 from tests.companion.avoidance.certified.flights import fly
 from tests.companion.avoidance.certified.plans import EPOCH
-from tests.companion.avoidance.certified.swarm import NEVER, Habits, Rough, Swarm
+from tests.companion.avoidance.certified.rough import NEVER, Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 FLIGHTS = settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 ROUGH = [
