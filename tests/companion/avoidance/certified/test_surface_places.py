@@ -168,7 +168,7 @@ def test_vehicles_that_come_from_one_side_share_a_circle(monkeypatch: Any, assig
     def around(place: Array, _target: Array | None) -> Aim:
         return Aim(target + CIRCLE.nearest(place - target), np.zeros(3), target, target, CIRCLE)
 
-    monkeypatch.setattr("tests.companion.avoidance.certified.swarm.standing", around)
+    monkeypatch.setattr("tests.companion.avoidance.certified.vehicle.standing", around)
     if not assigns:
         # As in the paper: each goes to the point nearest to it.
         monkeypatch.setattr(Places, "_on_surface", lambda _self, _rest, aim, *_: aim.destination)
