@@ -107,7 +107,7 @@ class Companion:
         )
         self.health = self._checks.monitor
         self._reports_on = config.ground_messages.texts or config.ground_messages.values
-        self._started = self._finishing = False
+        self._started = self._finishing = self._acted = False
 
     @property
     def system(self) -> int:
@@ -181,7 +181,8 @@ class Companion:
         if self._signing is not None:
             self._signing.present(now)
         answers = self._receive(now, inbox)
-        if not self._has_to_act(now):
+        self._acted = self._has_to_act(now)
+        if not self._acted:
             return self._encode(ground=answers)
         view = self.world.at(now)
         self.pilot.column_waits = self.avoidance.wait(now)
@@ -207,6 +208,15 @@ class Companion:
             autopilot += reports.get("autopilot", ())
             ground += reports.get("ground", ())
         return self._encode(autopilot=autopilot, swarm=swarm, ground=ground)
+
+    def recall(self) -> bool:
+        """Recall the plan that the last step made; return whether none of its messages needs to be sent.
+
+        For a step that took so long that its set-points are old, and its committed plan was to begin by now.
+        The plan of before is carried on, as the backup node does. Returns False in field mode, and for a
+        first plan. All messages that are not sent then are repeated by later steps.
+        """
+        return self._acted and self.avoidance.recall()
 
     def _start(self, now: int) -> None:
         """Start the periods of avoidance, set-points and health checks at ``now`` (µs), the first step."""

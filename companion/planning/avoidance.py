@@ -179,6 +179,10 @@ class Avoidance(Protocol):
         """Return the messages for the swarm link; ``farewell``: the vehicle makes no further plan."""
         ...
 
+    def recall(self) -> bool:
+        """Recall what the last ``messages`` announced, which are not sent; return False if that cannot be."""
+        ...
+
     def shared(self, now: int, view: View) -> Horizon | None:
         """Return the horizon to share with the neighbours in plan messages; None for no such message."""
         ...

@@ -211,6 +211,13 @@ class CertifiedAvoidance:
             self._flight.descend(now)
         return self._flight.messages(now, farewell=farewell)
 
+    def recall(self) -> bool:
+        """Carry the plan on in place of the one that the last messages announced, which are not sent.
+
+        Returns False if that is not possible, see ``CertifiedFlight.recall``.
+        """
+        return self._flight.recall()
+
     def shared(self, now: int, view: View) -> Horizon | None:
         """Return None: committed plans have messages of their own."""
         return None

@@ -164,6 +164,10 @@ class FieldAvoidance:
         """Return no messages: the field has none of its own."""
         return []
 
+    def recall(self) -> bool:
+        """Return False: a plan of the field is flown whether it was sent or not."""
+        return False
+
     def shared(self, now: int, view: View) -> Horizon | None:
         """Return the horizon to share with the neighbours; None if nothing is flown.
 

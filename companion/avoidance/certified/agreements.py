@@ -228,6 +228,12 @@ class Agreements:
         self._plans.add(stored(plan), {epoch for peer in self._peers.values() for epoch in peer.needed()})
         return True
 
+    def recall(self, epoch: int) -> None:
+        """Discard the own plan of ``epoch`` (µs), which was never sent, and the proposals on it."""
+        self._plans.remove(epoch)
+        for peer in self._everybody():
+            peer.recall(epoch)
+
     def update(self, now: int) -> None:
         """Take, propose and refuse agreements, with the own newest plan."""
         newest = self._plans.newest
@@ -252,7 +258,7 @@ class Agreements:
             known = set(self._peers)
             for peer in self._peers.values() if self._beyond is None else ():
                 known.update(system for system, departed in peer.names.items() if not departed)
-            self._members = frozenset(known) - {self.own} - self.left.keys()
+            self._members = frozenset(known).difference((self.own,), self.left)
         return self._members
 
     @property

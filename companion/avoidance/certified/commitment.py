@@ -41,6 +41,7 @@ class HoldReason(Enum):
     MISSING = "an input is missing: an agreement with a member, the own position, or the destination"
     CLOCK = "the clock of a member, or the own clock, is wrong"
     UNSOLVED = "no plan that keeps all planes was found"
+    LATE = "the step took so long that the plan was not sent"
     ROUNDING = "the plan found breaks a plane after rounding, and none keeps it by the rounding error"
 
 

@@ -110,6 +110,7 @@ class CertifiedFlight:
         self._polled_at: int | None = None
         self._place: tuple[int, Array | None] | None = None
         self._next_announcement = 0
+        self._unsent: int | None = None
         self.lookahead_s = float(self._seconds[-1]) + 1e-6 * certified.epoch_us
         """Time (s) from now to the end of the plan that is made next, at most."""
 
@@ -403,6 +404,7 @@ class CertifiedFlight:
         """
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()
+        self._unsent = None
         if farewell:
             self.commitment.turn(now)
             farewell = self.commitment.following is None
@@ -416,6 +418,7 @@ class CertifiedFlight:
             return [*sync, *self._statements(announced.epoch, every=False)] if not farewell else sync
         if announced.epoch != self.commitment.announced_until:
             self._repetition.update(now, self.agreements.received(now, EPOCHS))
+            self._unsent = self.commitment.announced_until
         self.commitment.announced_until = announced.epoch
         self._next_announcement = now + self._repetition.period
         self._announced = True
@@ -426,6 +429,23 @@ class CertifiedFlight:
         plans = [announced, *self._repeated()]
         tunnels = [Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan)) for plan in plans]
         return [*sync, *tunnels, *statements, *self._told.messages()]
+
+    def recall(self) -> bool:
+        """Carry the plan on in place of the one that the last ``messages`` announced for the first time.
+
+        Call it if these messages are not sent. Returns False for the first plan since the vehicle has begun
+        anew, which is not recalled.
+        """
+        before, self._unsent = self._unsent, None
+        following = self.commitment.following
+        if before is None or following is None:
+            return True
+        if following.epoch <= self.agreements.since:
+            return False
+        self.commitment.carry_on(HoldReason.LATE)
+        self.commitment.announced_until, self._next_announcement = before, 0
+        self.agreements.recall(following.epoch)
+        return True
 
     def _away(self, now: int) -> list[Message]:
         """Return the statement that another controller flies the vehicle, if plans were announced before."""

@@ -104,6 +104,13 @@ class Pair:
         if self.newer(one, self.considered):
             self.considered = one
 
+    def recall(self, own: int) -> None:
+        """Drop the agreements on the own plan of ``own`` (µs), which was never sent, nor were these.
+
+        They stay considered.
+        """
+        self.kept = tuple(one for one in self.kept if one.own != own)
+
     def acknowledge(self, other: int) -> bool:
         """Count the peer's plan of ``other`` (µs) as considered, if none since its beginning was.
 

@@ -213,6 +213,13 @@ class Peer:
         self.agree(one, planes)
         self._proposed[one] = now
 
+    def recall(self, own: int) -> None:
+        """Drop the proposals on the own plan of ``own`` (µs), which was never sent, nor were these."""
+        self.pair.recall(own)
+        self.agreed = {one: planes for one, planes in self.agreed.items() if one.own != own}
+        self._proposed = {one: since for one, since in self._proposed.items() if one.own != own}
+        self.settled, self.changed = None, True
+
     def waiting(self, now: int) -> int | None:
         """Return the time (µs) since the newest unanswered proposal; None if each is answered."""
         open_ = self.pair.open

@@ -79,6 +79,12 @@ class PlanFile:
             self._plans = {epoch: plan for epoch, plan in self._plans.items() if epoch in wanted}
         return True
 
+    def remove(self, epoch: int) -> None:
+        """Discard the plan of ``epoch`` (µs), if it is filed."""
+        self._plans.pop(epoch, None)
+        last = max(self._plans, default=None)
+        self.newest = None if last is None else self._plans[last]
+
     def clear(self) -> None:
         """Discard all plans."""
         self._plans.clear()

@@ -7,6 +7,7 @@ from typing import Final
 
 from companion.backup.links import LINKS
 from companion.node import Companion
+from mavlink_bridge.clocks.clock import Clock
 from mavlink_bridge.messages import GpsGlobalOrigin, Heartbeat, Message, Source
 from mavlink_bridge.node import Datagram, Node
 from mavlink_bridge.wire.codec import Codec
@@ -15,6 +16,8 @@ from outrider.onboard.backup_copies import Copies, CopySender
 
 _ORIGIN_PERIOD_US: Final = 1_000_000
 """Time between two copies of the autopilot's origin (µs), for a backup node that begins in flight."""
+_LATE_PERIODS: Final = 3
+"""Number of set-point periods that a step may take: after four the backup node continues the plan before."""
 
 
 class CopiedNode:
@@ -22,7 +25,9 @@ class CopiedNode:
 
     The autopilot's heartbeat and origin are copied as the companion has accepted them, so that forged ones do
     not reach the backup node. ``signing``: the companion's. ``holds`` returns whether ``inner`` has replaced
-    the companion by the request for the hold.
+    the companion by the request for the hold. ``clock`` is that of the loop: a step that took too long by it
+    sends nothing to autopilot and swarm, and its plan is recalled, because the backup node may fly the plan
+    of before. ``withheld`` counts these steps.
     """
 
     def __init__(
@@ -30,11 +35,14 @@ class CopiedNode:
         inner: Node,
         companion: Companion,
         copies: CopySender,
+        clock: Clock,
         signing: Signing | None = None,
         holds: Callable[[], bool] = lambda: False,
     ) -> None:
         self._inner, self._companion = inner, companion
-        self._copies, self._signing, self._holds = copies, signing, holds
+        self._copies, self._clock, self._signing, self._holds = copies, clock, signing, holds
+        self._longest = _LATE_PERIODS * companion.config.rates.setpoint_us
+        self.withheld = 0
         self._codec = Codec()
         self._beat: Heartbeat | None = None
         self._origin: tuple[float, float, float] | None = None
@@ -48,6 +56,10 @@ class CopiedNode:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Step the node at ``now`` (µs), and copy what it is about to send."""
         leaving = self._inner.step(now, inbox)
+        late = self._clock.now() - now > self._longest
+        if late and leaving and not self._holds() and self._companion.recall():
+            self.withheld += 1
+            leaving = [datagram for datagram in leaving if datagram.link not in LINKS]
         sent = dict.fromkeys(LINKS, b"")
         for link, data in leaving:
             if link in sent:

@@ -20,7 +20,6 @@ from mavlink_bridge.loops.garbage import IdleCollector
 from mavlink_bridge.loops.lockstep import Scheduled
 from mavlink_bridge.loops.priority import ask_for_priority, sharpen_timers
 from mavlink_bridge.loops.realtime import RealTime
-from mavlink_bridge.node import Node
 from mavlink_bridge.wire.signing import Signing
 from outrider.onboard.backup_copies import CopySender
 from outrider.onboard.clocks import CompanionClock
@@ -137,6 +136,13 @@ class Worker:
         }
 
         certified = asked.config.certified
+        clock = wall if followed is None else followed
+        copied = None
+        if self._copies is not None:
+            copied = CopiedNode(
+                supervised, node, self._copies, clock, self._signing, lambda: supervised.last is not None
+            )
+        withheld = 0
 
         def stepped(now: int) -> bool:
             alone = os.getppid() != self._parent or self._orders.alone
@@ -149,6 +155,10 @@ class Worker:
                     departures.take(now, message)
                 node.would.clear()
             news.look(now, wall.now())
+            nonlocal withheld
+            if copied is not None and copied.withheld > withheld:
+                withheld = copied.withheld
+                self._report_error("a step took so long that it sent nothing, and its plan is carried on")
             if certified and self._orders.stop and supervised.rested:
                 return True
             return supervised.last is not None and supervised.last.over
@@ -158,25 +168,25 @@ class Worker:
             def idle(free: int) -> None:
                 garbage.idle(free if followed is None else int(free / followed.rate))
 
-            flying: Node = supervised
-            if self._copies is not None:
-                flying = CopiedNode(
-                    supervised, node, self._copies, self._signing, lambda: supervised.last is not None
-                )
             loop = RealTime(
-                Scheduled(flying, asked.config.period_us),
+                Scheduled(supervised if copied is None else copied, asked.config.period_us),
                 links,
-                wall if followed is None else followed,
+                clock,
                 taps=(log, departures),
                 on_idle=idle,
             )
             try:
                 loop.run(lambda: self._orders.stop and not certified, stepped)
             finally:
-                self._leave(loop, news, departures, 1.0 if followed is None else followed.rate)
+                self._leave(loop, news, departures, 1.0 if followed is None else followed.rate, withheld)
 
     def _leave(
-        self, loop: RealTime, news: StatusReports, departures: TransmitStatistics, rate: float
+        self,
+        loop: RealTime,
+        news: StatusReports,
+        departures: TransmitStatistics,
+        rate: float,
+        withheld: int,
     ) -> None:
         """Send the figures of the summary to the parent."""
         node, statistics = self.companion, loop.statistics
@@ -208,6 +218,7 @@ class Worker:
                 "overruns": statistics.overruns,
                 "kept_back": sum(read_only.kept for read_only in self._read_only_links),
             },
+            steps_withheld=withheld,
             deadline_steps=statistics.steps + statistics.skipped,
             deadline_misses=statistics.misses + statistics.skipped,
             lateness_ms={

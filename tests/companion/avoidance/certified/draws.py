@@ -32,8 +32,16 @@ def roughs(systems: int) -> st.SearchStrategy[Rough]:
 def habits(*, leave: bool) -> st.SearchStrategy[Habits]:
     on = st.integers(0, 400_000)
     return st.builds(
-        lambda on, later, leaves, frozen, released, ahead, wanders, away: Habits(
-            on, on + later, leaves, tuple(frozen), tuple(released), ahead, wanders, leaves + away
+        lambda on, later, leaves, frozen, released, ahead, wanders, away, stalls: Habits(
+            on,
+            on + later,
+            leaves,
+            tuple(frozen),
+            tuple(released),
+            ahead,
+            wanders,
+            leaves + away,
+            stalls=tuple(stalls),
         ),
         on,
         on,
@@ -43,6 +51,7 @@ def habits(*, leave: bool) -> st.SearchStrategy[Habits]:
         st.integers(-5_000, 5_000),
         st.sampled_from([0.0, 0.08]),
         st.sampled_from([NEVER, 40_000, 300_000, 1_200_000]) if leave else st.just(NEVER),
+        st.lists(spans, max_size=2),
     )
 
 

@@ -107,6 +107,16 @@ class Flown:
             least = min(least, (np.linalg.norm(curves(pairs), axis=-1).min(axis=-1) - more).min())
         return float(least)
 
+    def beside(self) -> int:
+        """In how many epochs a vehicle flies another plan than its backup node, while its step lasts."""
+        return sum(
+            vehicle.plan(epoch) != carried_on(before, (epoch - before.epoch) // before.dt)
+            for vehicle in self.vehicles
+            for since, until, before in vehicle.stalled
+            for epoch in self.epochs()
+            if max(since, before.epoch - EPOCH) < epoch - EPOCH <= until
+        )
+
     def unflagged(self) -> bool:
         """Whether an autopilot decides on a height in an epoch whose plan is no column."""
         length = self.config.certified.epoch_us
@@ -181,6 +191,7 @@ class Flown:
             "a plan crosses a plane": self.crossed() > EXACT,
             "a plan beside an abandoned one": bool(self.abandoned()),
             "a last plan that is not flown on": bool(self.misled),
+            "another plan than that of the backup node": bool(self.beside()),
             "two plans of an epoch": any(vehicle.contradictions for vehicle in self.vehicles),
         }
         return [name for name, broken in found.items() if broken]

@@ -41,7 +41,8 @@ class Habits(NamedTuple):
     about its place by ``wanders`` m; on the ground only its estimate does. When it ``returns`` it joins again
     where it is. When its companion ``restarts`` it has forgotten everything, and begins anew where the
     vehicle is. One that ``takes_off`` stands on the ground below its place before, and climbs for ``CLIMB``;
-    one that ``lands`` stays down."""
+    one that ``lands`` stays down. A step that begins while it ``stalls`` (from, till) lasts until the end of
+    that, and sends nothing if its plan can be recalled."""
 
     on: int = 0
     steers: int = 0
@@ -54,3 +55,4 @@ class Habits(NamedTuple):
     restarts: int = NEVER
     takes_off: int = -1
     lands: int = NEVER
+    stalls: tuple[tuple[int, int], ...] = ()

@@ -73,12 +73,20 @@ class Swarm(Flown):
         for tick in range(0, until, TICK):
             for phase, vehicle in order:
                 since, habits = tick + phase, vehicle.habits
-                if since < habits.on or within(since, habits.frozen):
+                if since < max(habits.on, vehicle.busy_until) or within(since, habits.frozen):
                     continue
-                for message in vehicle.step(since, goals(since, vehicle.system)):
-                    self.sent.append(message.payload)
-                    self._carry(since, vehicle, message)
+                messages = vehicle.step(since, goals(since, vehicle.system))
+                if vehicle.stall(since):
+                    messages = []
+                vehicle.note(sent=bool(messages))
+                self.send(vehicle.busy_until, vehicle, messages)
                 self.record(since, vehicle)
+
+    def send(self, since: int, sender: Vehicle, messages: Sequence[Tunnel]) -> None:
+        """Send ``messages``, which leave the vehicle at ``since`` (µs of the run)."""
+        for message in messages:
+            self.sent.append(message.payload)
+            self._carry(since, sender, message)
 
     def _carry(self, since: int, sender: Vehicle, message: Tunnel) -> None:
         rough, rng = self._rough, self._rng

@@ -58,6 +58,11 @@ class Vehicle:
         """From when till when (µs since ``EPOCH`` by its clock) its autopilot alone decides on its height."""
         self.slanted = False
         """Whether it kept planes that are not upright when its autopilot began to decide on its height."""
+        self.busy_until = 0
+        """Until when (µs of the run) its last step lasts."""
+        self.stalled: list[tuple[int, int, WirePlan]] = []
+        """From when till when (µs of the run) a step lasted that sent nothing, and its newest plan until
+        then, which a backup node flies meanwhile."""
         self._handles = self._fly if habits.takes_off < 0 else self._stand
         self._begun: dict[int, int] = {}
 
@@ -73,7 +78,7 @@ class Vehicle:
             while self.inbox and self.inbox[0][0] <= since:
                 heappop(self.inbox)
         now = EPOCH + since + self.habits.ahead
-        flight, commitment = self.flight, self.flight.commitment
+        flight = self.flight
         while self.inbox and self.inbox[0][0] <= since:
             message = heappop(self.inbox)[2]
             if message.payload_type == AGREEMENTS:
@@ -91,12 +96,29 @@ class Vehicle:
             standing_by = self._handles == self._stand and not flight.reservation.joined
             leaving = standing_by or self._handles == self._sink
         messages = flight.messages(now, farewell=leaving)
-        # Before its first plan, a companion that has restarted flies what the one before has told.
-        first = flight.agreements.since if self._restarted else 0
-        for plan in (commitment.current, commitment.following):
-            if plan is not None and plan.epoch >= first and (self.plans or messages):
-                self.contradictions += self.plans.setdefault(plan.epoch, plan) != plan
         return [message for message in messages if isinstance(message, Tunnel)]
+
+    def stall(self, since: int) -> bool:
+        """Let the step that began at ``since`` (µs of the run) last; return whether it sends nothing."""
+        lasts = (end for begin, end in self.habits.stalls if begin <= since < end)
+        self.busy_until = max(lasts, default=since)
+        return self.busy_until > since and self.recall(since)
+
+    def recall(self, since: int) -> bool:
+        """Recall the step that began at ``since`` (µs of the run), see ``CertifiedFlight``."""
+        recalled = self.flight.recall()
+        if recalled and self.plans:
+            self.stalled.append((since, self.busy_until, self.plans[max(self.plans)]))
+        return recalled
+
+    def note(self, *, sent: bool) -> None:
+        """Record what it flies after a step, and whether that ``sent`` anything."""
+        commitment = self.flight.commitment
+        # Before its first plan, a companion that has restarted flies what the one before has told.
+        first = self.flight.agreements.since if self._restarted else 0
+        for plan in (commitment.current, commitment.following):
+            if plan is not None and plan.epoch >= first and (self.plans or sent):
+                self.contradictions += self.plans.setdefault(plan.epoch, plan) != plan
 
     def _at(self, height: float) -> Motion:
         return Motion(np.array([*self.place[:2], height]), np.zeros(3), np.zeros(3))
