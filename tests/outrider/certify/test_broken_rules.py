@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from itertools import accumulate
+from math import sqrt
 from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.avoidance.certified import negotiation
+from companion.avoidance.certified import constraint_sources, negotiation
 from companion.avoidance.certified.agreed_planes import AgreedPlanes, made
 from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.margins import between
 from companion.avoidance.certified.pair import Agreement, Pair
 from companion.avoidance.certified.reservation import Reservation
 from companion.config.certified import CertifiedConfig
+from companion.config.planning import FieldConfig, LimitsConfig
 from companion.values.components import COMPONENT
 from mavlink_bridge.messages import CommandLong, Source, Tunnel
 from mavlink_bridge.tlog.log import TlogWriter, read_tlog
@@ -24,7 +27,7 @@ from mavlink_bridge.wire.agreements import Entry, pack, unpack
 from mavlink_bridge.wire.codec import Codec
 from outrider.certify.reading import read
 from outrider.certify.verdict import judge
-from tests.outrider.certify.runs import CERTIFIED, LOSSY, SLOW, Replay, fly, tunnels
+from tests.outrider.certify.runs import CERTIFIED, LOSSY, PLANAR, SLOW, Replay, fly, tunnels
 
 LENGTH = CertifiedConfig().epoch_us
 """Length of an epoch, µs."""
@@ -101,6 +104,16 @@ def taken_again(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Pair, "newer", lambda self, one, than: one not in self.kept)
 
 
+def errors_of_one_side(patch: pytest.MonkeyPatch) -> None:
+    """Plans keep √2·k·σ in place of 2·k·σ, as if errors were independent and not opposite."""
+
+    def independent(certified: CertifiedConfig, field: FieldConfig, limits: LimitsConfig) -> float:
+        surplus = (2.0 - sqrt(2.0)) * certified.sigmas * field.position_sigma
+        return between(certified, field, limits) - surplus
+
+    patch.setattr(constraint_sources, "between", independent)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("breaks", "whats"),
@@ -127,6 +140,14 @@ def test_companions_that_break_a_rule_are_found(
             assert not verdict.certified
             return
     pytest.fail("twenty flights were certified")
+
+
+@pytest.mark.slow
+def test_a_distance_for_independent_errors_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    errors_of_one_side(monkeypatch)
+    run = fly(tmp_path / "run", 3, options=PLANAR._replace(sensors="gnss"))
+    verdict = judge(read(run, lambda _what, _share: None))
+    assert "plans nearer than certified" in {finding.what for finding in verdict.findings}
 
 
 @pytest.mark.slow

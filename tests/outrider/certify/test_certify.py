@@ -181,13 +181,16 @@ def test_what_nobody_takes_is_found_and_does_not_count(
     assert verdict.document()["pairs"] == 3
 
 
-def test_a_plan_of_another_time_is_found() -> None:
+@pytest.mark.parametrize(("epochs", "usable"), [(-5, False), (-3, True), (10, True), (14, False)])
+def test_a_plan_of_another_time_is_found(epochs: int, usable: bool) -> None:
+    """Of one that no companion accepts: more than 4 epochs early, or more than 12 late."""
     whole = evidence({11: [A, on(A)], 12: [B, on(B)]})
-    late = tuple(
-        log._replace(sightings=tuple(s._replace(time=s.time + 10 * EPOCH) for s in log.sightings))
+    moved = tuple(
+        log._replace(sightings=tuple(s._replace(time=s.time + epochs * EPOCH) for s in log.sightings))
         for log in whole.logs
     )
-    assert set(whats(judge(whole._replace(logs=late)))) == {"a plan of another time", "no plan of its own"}
+    found = {"a plan of another time", "no plan of its own"}
+    assert found.isdisjoint(whats(judge(whole._replace(logs=moved)))) is usable
 
 
 @pytest.mark.parametrize("most", [1999, 2000])
@@ -258,7 +261,10 @@ def test_who_comes_too_near_is_found_exactly(
 
 def test_a_pair_that_began_nearer_may_stay_but_not_come_nearer() -> None:
     near, nearer = standing((1.0, 0.0, 5.0)), standing((0.9, 0.0, 5.0), BEGAN + EPOCH)
-    assert judge(evidence({11: [A, on(A)], 12: [near, on(near)]})).certified
+    began = judge(evidence({11: [A, on(A)], 12: [near, on(near)]}))
+    assert began.certified
+    assert began.document()["began_nearer"] == 1
+    assert judge(evidence({11: [A, on(A)], 12: [B, on(B)]})).document()["began_nearer"] == 0
     # From an anchor on nothing is promised before they are far enough apart; it is told how often.
     verdict = judge(evidence({11: [A, on(A), on(A, 2)], 12: [near, nearer, on(nearer)]}))
     assert verdict.certified

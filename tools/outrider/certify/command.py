@@ -53,6 +53,8 @@ def show(name: str, verdict: Verdict) -> None:
     word = "certified" if verdict.certified else "not certified"
     if verdict.certified and pairs.resting:
         word = f"certified but for {pairs.resting} pairs after an anchor"
+    if verdict.certified and pairs.near:
+        word += f", and for the distance of {pairs.near} pairs that began too near"
     table = Table(show_header=False)
     rows = {
         "vehicles": len(verdict.histories),
@@ -60,6 +62,7 @@ def show(name: str, verdict: Verdict) -> None:
         "pairs of plans checked": pairs.checked,
         "… not checked after a farewell": pairs.farewell,
         "… not checked after an anchor": pairs.resting,
+        "pairs of vehicles that began nearer than required": pairs.near,
         "least distance of two plans, m": ""
         if nearest is None
         else f"{nearest.distance:.4f}, {nearest.who[0]} and {nearest.who[1]} at "

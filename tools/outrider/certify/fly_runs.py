@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import between, from_surfaces, further
 from companion.config.obstacles import Obstacle
+from outrider.certify.distances import for_column, of_plans, of_surfaces
 from outrider.certify.evidence import Terms, milli
 from outrider.certify.ranges import reach_of
 from outrider.errors import Fault, InputError
@@ -110,12 +110,12 @@ def _terms(config: FlyConfig) -> Terms:
         certified.epoch_us,
         companion.horizon.steps + 1,
         identity(companion, config.origin.frame),
-        between(certified, companion.field, companion.limits),
+        of_plans(companion),
         milli(companion.limits.u_max),
         companion.planar,
-        further(certified),
+        for_column(companion),
         companion.field.downwash,
-        from_surfaces(certified, companion.field, companion.limits),
+        of_surfaces(companion),
         reach_of(companion),
         milli(companion.limits.least_u),
         companion.plane_shift,

@@ -15,10 +15,10 @@ from companion.avoidance.certified.committed import carried_on, rests
 from mavlink_bridge.wire.plan import WirePlan, pack
 from outrider.certify.evidence import Finding, Log, LoggedPlan, Terms
 
-_MAX_RECEPTION_EPOCHS = 4
-"""Largest interval between a plan's epoch and its reception (epochs).
+_OLDEST, _AHEAD = 12, 4
+"""Largest time (epochs) by which a plan may begin before it is sent or received, and after.
 
-Receivers refuse a plan beyond it.
+Receivers refuse a plan beyond it (``companion/avoidance/certified/agreements.py``).
 """
 _AXES = ("east", "north", "up")
 
@@ -135,7 +135,7 @@ def _flaw(plan: WirePlan, terms: Terms, seen: Sequence[int]) -> tuple[str, str] 
         knots = f"{len(plan.accelerations)} knots of {plan.dt} µs from {plan.epoch} µs"
         fleet = f"the fleet's are {terms.steps} of {terms.dt} µs from k·{terms.epoch} µs"
         return "a plan on other knots", f"{knots}; {fleet}"
-    if min(abs(plan.epoch - time) for time in seen) > _MAX_RECEPTION_EPOCHS * terms.epoch:
+    if not any(-_OLDEST <= (plan.epoch - time) / terms.epoch <= _AHEAD for time in seen):
         return "a plan of another time", f"begins {1e-6 * (plan.epoch - seen[0]):.1f} s after it was told"
     return None
 

@@ -45,13 +45,15 @@ class Pairs(NamedTuple):
 
     ``checked`` is the number of pairs of plans checked. The others were not, because one of the two had said
     ``farewell`` or the pair was ``resting`` after an anchor. ``epochs`` (µs): all epochs of which a vehicle
-    has a plan.
+    has a plan. ``near`` is the number of pairs whose first plans were nearer than required, against
+    assumption (e): they need only come no nearer.
     """
 
     epochs: tuple[int, ...]
     checked: int
     farewell: int
     resting: int
+    near: int
     nearest: Nearest | None
     findings: list[Finding]
 
@@ -63,6 +65,8 @@ class _Pair:
         self._who, self._required = who, required
         self._keeps = 0.0
         self._rests = False
+        self.near: bool | None = None
+        """Whether the first plans that were checked were nearer than required; None before the first."""
         self._breach: tuple[Nearest, int, int] | None = None
         """Worst distance of the current breach, its first epoch (µs) and its number of epochs."""
         self.findings: list[Finding] = []
@@ -76,6 +80,8 @@ class _Pair:
         if self._rests and distance < self._required - SLACK:
             return False
         self._rests = False
+        if self.near is None:
+            self.near = distance < self._required - SLACK
         if distance < self._keeps - SLACK:
             here = Nearest(distance, self._who, epoch)
             worst, since, count = self._breach or (here, epoch, 0)
@@ -108,7 +114,7 @@ def check(histories: Sequence[History], terms: Terms, spans: Sequence[tuple[Span
     current: dict[int, WirePlan] = {}
     pairs: dict[tuple[int, int], _Pair] = {}
     findings: list[Finding] = []
-    checked = farewell = resting = 0
+    checked = farewell = resting = near = 0
     nearest: Nearest | None = None
     for epoch in epochs:
         anchored = set()
@@ -125,7 +131,9 @@ def check(histories: Sequence[History], terms: Terms, spans: Sequence[tuple[Span
         together = list(combinations(there, 2))
         farewell += len(current) * (len(current) - 1) // 2 - len(together)
         # A vehicle that returns after a farewell starts anew with all others.
-        findings += _concluded(pairs.pop(who) for who in set(pairs).difference(together))
+        over = [pairs.pop(who) for who in set(pairs).difference(together)]
+        near += sum(pair.near is True for pair in over)
+        findings += _concluded(over)
         columns = [(i in decides) + (j in decides) for i, j in together]
         distances = _distances(current, epoch, together, columns, terms)
         for (i, j), distance in zip(together, distances, strict=True):
@@ -137,8 +145,9 @@ def check(histories: Sequence[History], terms: Terms, spans: Sequence[tuple[Span
             checked += 1
             here = Nearest(distance, who, epoch)
             nearest = here if nearest is None else min(nearest, here)
+    near += sum(pair.near is True for pair in pairs.values())
     findings += _concluded(pairs.values())
-    return Pairs(epochs, checked, farewell, resting, nearest, findings)
+    return Pairs(epochs, checked, farewell, resting, near, nearest, findings)
 
 
 def _distances(

@@ -10,7 +10,6 @@ from pathlib import Path
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.fingerprint import identity
-from companion.avoidance.certified.margins import between, from_surfaces, further
 from companion.config.obstacles import Obstacle
 from companion.values.components import COMPONENT
 from mavlink_bridge.errors import LogError, PlanWireError
@@ -24,6 +23,7 @@ from mavlink_bridge.wire.fleet_time import PAYLOAD_TYPE as FLEET_TIME
 from mavlink_bridge.wire.fleet_time import unpack as unpack_fleet_time
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import unpack as unpack_plan
+from outrider.certify.distances import for_column, of_plans, of_surfaces
 from outrider.certify.evidence import (
     Evidence,
     FarewellChange,
@@ -122,12 +122,12 @@ def terms_of(scenario: Scenario) -> Terms:
         certified.epoch_us,
         config.horizon.steps + 1,
         identity(config, FleetFrame(origin.latitude, origin.longitude, origin.altitude)),
-        between(certified, config.field, limits),
+        of_plans(config),
         milli(limits.u_max),
         config.planar,
-        further(certified),
+        for_column(config),
         config.field.downwash,
-        from_surfaces(certified, config.field, limits),
+        of_surfaces(config),
         reach_of(config),
         milli(limits.least_u),
         config.plane_shift,

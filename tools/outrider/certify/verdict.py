@@ -64,7 +64,8 @@ class Verdict(NamedTuple):
         """Return the verdict as JSON values.
 
         ``plans``: number of those that were not carried on, anchors among them; ``unchecked``: pairs left
-        out, by reason. ``obstacles_checked``: number of pairs of a plan and a fixed obstacle near it.
+        out, by reason; ``began_nearer``: pairs whose first plans were nearer than required.
+        ``obstacles_checked``: number of pairs of a plan and a fixed obstacle near it.
         """
         pairs, nearest, obstacle = self.pairs, self.pairs.nearest, self.fixed.nearest
         return {
@@ -73,6 +74,7 @@ class Verdict(NamedTuple):
             "epochs": len(pairs.epochs),
             "pairs": pairs.checked,
             "unchecked": {"farewell": pairs.farewell, "resting": pairs.resting},
+            "began_nearer": pairs.near,
             "least_m": None if nearest is None else nearest.distance,
             "least_s": None if nearest is None else self.seconds(nearest.epoch),
             "least_between": None if nearest is None else list(nearest.who),

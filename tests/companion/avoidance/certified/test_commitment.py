@@ -3,6 +3,7 @@ that was not found is the old one."""
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from itertools import pairwise
 
 import numpy as np
@@ -306,3 +307,10 @@ def test_an_epoch_is_no_longer_than_a_plan() -> None:
     certified = CertifiedConfig(dt_us=DT, epoch_us=1_000_000)
     with pytest.raises(ValidationError, match="epoch_us"):
         CompanionConfig(horizon=HorizonConfig(steps=3), certified=certified)
+
+
+@pytest.mark.parametrize(("clock_us", "allowed"), [(49_000, True), (50_000, False)])
+def test_two_clocks_differ_by_less_than_an_epoch(clock_us: int, allowed: bool) -> None:
+    given = {"dt_us": 100_000, "epoch_us": 100_000, "clock_us": clock_us}
+    with nullcontext() if allowed else pytest.raises(ValidationError, match="clock_us"):
+        CertifiedConfig.model_validate(given)
