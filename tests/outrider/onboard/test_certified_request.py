@@ -57,6 +57,14 @@ def test_what_cannot_be_flown_is_refused(tmp_path: Path, changes: dict[str, Any]
         asked(tmp_path, **changes)
 
 
+@pytest.mark.parametrize("tube", [None, 0.25, 1.0])
+def test_a_tube_that_is_not_stated_is_warned_of(
+    tmp_path: Path, tube: float | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked(tmp_path, MEASURED if tube is None else {**MEASURED, "tube": tube})
+    assert ("certified.tube: not stated, so 0.25 m counts" in capsys.readouterr().err) is (tube is None)
+
+
 @pytest.mark.parametrize("swarm", [NETWORK, "mcast:", "udpout:127.0.0.1:14551", "/dev/ttyUSB0,921600"])
 def test_the_own_clock_counts_only_among_companions_of_one_computer(tmp_path: Path, swarm: str) -> None:
     own = {"fleet": [1, 2]}

@@ -14,6 +14,7 @@ from outrider.address_scope import exposed
 from outrider.errors import InputError
 from outrider.key_files import key_of
 from outrider.onboard.link_budget import doubts, doubts_of_autopilot
+from outrider.onboard.unmeasured_tube import doubts_of_tube
 from outrider.resources import find
 from outrider.scenarios.fleet_file import with_fleet_file
 from outrider.scenarios.fly_config import FlyConfig
@@ -124,6 +125,7 @@ def checked(options: Options) -> Request:
         doubts(swarm, config.settings, signed),
         doubts_of_autopilot(endpoints["autopilot"], config.settings, signed, dry_run=options.dry_run),
         doubts_of_plans(config.settings),
+        doubts_of_tube(config.settings),
     ):
         if doubt:
             sys.stderr.write(f"outrider fly: {doubt}\n")
