@@ -62,7 +62,7 @@ def test_a_tube_that_is_not_stated_is_warned_of(
     tmp_path: Path, tube: float | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked(tmp_path, MEASURED if tube is None else {**MEASURED, "tube": tube})
-    assert ("certified.tube: not stated, so 0.25 m counts" in capsys.readouterr().err) is (tube is None)
+    assert ("certified.tube: not stated: 0.25 m, which" in capsys.readouterr().err) is (tube is None)
 
 
 @pytest.mark.parametrize("swarm", [NETWORK, "mcast:", "udpout:127.0.0.1:14551", "/dev/ttyUSB0,921600"])

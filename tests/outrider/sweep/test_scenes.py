@@ -322,6 +322,26 @@ def test_gusts_and_jumps_are_as_many_and_as_strong_as_the_scene_allows_and_chang
     assert gusts == jumps == {0, 1, 2}
 
 
+def test_silent_ends_cut_off_those_that_vanish_and_change_nothing_else() -> None:
+    ended = 0
+    for seed in range(1, 31):
+        document, without = struck(seed, silent=True), struck(seed)
+        vanished = {
+            fault["vehicle"]: fault["at_s"] for fault in document["faults"] if fault["kind"] == "vanish"
+        }
+        for system, at_s in vanished.items():
+            (cut,) = [one for one in document["partitions"] if one["members"] == [system]]
+            assert cut["at_s"] == at_s
+            assert at_s + cut["for_s"] > document["cap_s"]
+        others = [
+            [cut for cut in one["partitions"] if len(cut["members"]) > 1] for one in (document, without)
+        ]
+        assert others[0] == others[1]
+        assert {**document, "partitions": []} == {**without, "partitions": []}
+        ended += len(vanished)
+    assert ended > 5
+
+
 def test_restarts_are_those_of_companions_that_neither_hang_nor_vanish_and_change_nothing_else() -> None:
     numbers = set()
     for seed in range(1, 31):

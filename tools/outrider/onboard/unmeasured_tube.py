@@ -11,6 +11,6 @@ def doubts_of_tube(config: CompanionConfig) -> str:
     if config.avoidance != "certified" or stated_at(config, ("certified", "tube")):
         return ""
     return (
-        f"companion.certified.tube: not stated, so {config.certified.tube:g} m counts, which is not measured: "
+        f"companion.certified.tube: not stated: {config.certified.tube:g} m, which is not measured, counts: "
         "the separation holds only if the autopilot keeps to it; advised: outrider preflight --fly"
     )

@@ -19,6 +19,8 @@ Milliseconds = Annotated[float, Field(ge=0.0, le=5_000.0)]
 Seconds = Annotated[float, Field(gt=0.0, le=120.0)]
 _KNOT_US = CertifiedConfig().dt_us
 _LONGEST_US: int = CertifiedConfig.model_json_schema()["properties"]["epoch_us"]["maximum"]
+_FOR_GOOD_S = 600.0
+"""Longer than any flight."""
 Few = Annotated[int, Field(ge=0, le=20)]
 
 
@@ -51,6 +53,11 @@ class Trouble(Part):
     partitions: tuple[Few, Few] = Field((0, 0), description="how often the swarm is divided in two")
     freezes: tuple[Few, Few] = Field((0, 0), description="how many companions hang for a while")
     vanishes: tuple[Few, Few] = Field((0, 0), description="how many companions vanish for good")
+    silent: bool = Field(
+        False,
+        description="whether the radio of a vehicle fails for good when its companion vanishes: then nobody"
+        " receives the farewell of its backup node",
+    )
     gusts: tuple[Few, Few] = Field((0, 0), description="how many gusts, of for_s")
     gust: Annotated[float, Field(ge=0.0, le=30.0)] = Field(
         0.0, description="largest speed of a gust, m/s; any horizontal direction"
@@ -135,7 +142,20 @@ def strike(trouble: Trouble, count: int, random: np.random.Generator) -> dict[st
         for system in left[: many(trouble.restarts, len(left))]:
             at_s, for_s = drawn((0.1, trouble.within_s)), drawn(trouble.for_s)
             faults.append({"kind": "restart", "vehicle": system, "at_s": at_s, "for_s": for_s})
+    if trouble.silent:
+        _silence(document)
     return document
+
+
+def _silence(document: dict[str, Any]) -> None:
+    """Cut those whose companions vanish in ``document`` off from all others, from then on."""
+    for fault in document["faults"]:
+        if fault["kind"] == "vanish":
+            alone = [fault["vehicle"]]
+            # Two partitions of the same members must not overlap.
+            document["partitions"] = [cut for cut in document["partitions"] if cut["members"] != alone]
+            cut = {"at_s": fault["at_s"], "for_s": _FOR_GOOD_S, "members": alone}
+            document["partitions"].append(cut)
 
 
 def _strike_estimates(
