@@ -74,7 +74,7 @@ def test_a_companion_that_restarts_in_the_air_begins_where_the_plan_before_ends(
         "antipodal-8", {**SWAP, "flavour": flavour, "faults": [struck], "autopilot": {"guided_timeout": 0.3}}
     )
     flown = fly(of, 1, tmp_path)
-    # The rest of a plan of 3.2 s, with a set-point every 20 ms.
+    # The rest of a plan of 3.5 s, with a set-point every 20 ms.
     assert flown.flight.backup_nodes[1].carried > 100
     assert flown.summary["converged"] is True
     assert flown.summary["d_min_violations"] == 0

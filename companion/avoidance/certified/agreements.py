@@ -32,7 +32,7 @@ _OLDEST, _AHEAD = 12, 4
 _REPORTED_US = 5_000_000
 """Time (µs) after a message of another fleet, or of a wrong clock, during which its sender is reported.
 
-Nothing of a sender of another fleet is accepted in this time.
+In this time no statement of a sender of another fleet is accepted, and no plan, unless it is expected.
 """
 _HEARD_US = 5_000_000
 """Time (µs) after the last plan or statement of a peer during which its lost plans are counted."""
