@@ -61,7 +61,8 @@ def swarms(draw: st.DrawFn, *, leave: bool = False) -> Swarm:
     k, seed = draw(st.integers(2, 5)), draw(st.integers(0, 2**16))
     rough = draw(roughs(k))
     own = draw(st.lists(habits(leave=leave), min_size=k, max_size=k))
-    swarm = Swarm(starts(k, seed), rough, own, seed, epoch=draw(st.sampled_from([200_000, 400_000])))
+    epoch, shift = draw(st.sampled_from([200_000, 400_000])), draw(st.sampled_from([0.75, 0.0]))
+    swarm = Swarm(starts(k, seed), rough, own, seed, epoch=epoch, settings={"plane_shift": shift})
     swarm.run(UNTIL, goals(seed))
     return swarm
 
