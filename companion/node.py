@@ -210,11 +210,12 @@ class Companion:
         return self._encode(autopilot=autopilot, swarm=swarm, ground=ground)
 
     def recall(self) -> bool:
-        """Recall the plan that the last step made; return whether none of its messages needs to be sent.
+        """Recall the plan that the last step made; return whether its messages may be left unsent.
 
-        For a step that took so long that its set-points are old, and its committed plan was to begin by now.
-        The plan of before is carried on, as the backup node does. Returns False in field mode, and for a
-        first plan. All messages that are not sent then are repeated by later steps.
+        For a step that took so long that its set-points are old and its committed plan may have to have begun
+        by now: the plan of before is carried on, as the backup node does. Returns False in field mode, and
+        for a plan that cannot be recalled. Plans, statements and commands are repeated by later steps;
+        replies to TIMESYNC, detections and status texts that are left unsent are lost.
         """
         return self._acted and self.avoidance.recall()
 

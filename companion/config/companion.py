@@ -182,6 +182,12 @@ class CompanionConfig(Settings):
         longest = (self.horizon.steps + 1) * self.certified.dt_us
         if self.certified.epoch_us > longest:
             raise ValueError(f"certified.epoch_us must not exceed (N + 1)·certified.dt_us = {longest}")
+        most = self.certified.epoch_us - self.rates.setpoint_us
+        if 2 * self.certified.clock_us >= most:
+            # Step 5 of the proof: one clock may be ahead and the other behind, and a step late by a period.
+            raise ValueError(
+                f"certified.clock_us must be less than half of epoch_us - rates.setpoint_us, {most // 2}"
+            )
         for name in ("tangential", "approach_angle"):
             if name in self.methods and getattr(self, name).force_max <= max(self.limits.strongest):
                 raise ValueError(f"{name}.force_max must exceed u_max, or the input cancels it")

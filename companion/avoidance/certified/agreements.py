@@ -17,7 +17,7 @@ from companion.avoidance.certified.committed import horizon_of
 from companion.avoidance.certified.fingerprint import FleetIdentity
 from companion.avoidance.certified.negotiation import Geometry, Negotiation
 from companion.avoidance.certified.pair import Agreement
-from companion.avoidance.certified.peer import Peer
+from companion.avoidance.certified.peer import Lists, Peer
 from companion.avoidance.certified.peer_plans import PlanFile, StoredPlan, read, stored
 from companion.config.certified import CertifiedConfig
 from companion.errors import CompanionError
@@ -73,6 +73,8 @@ class Agreements:
         self._differing: dict[int, int] = {}
         self._early: dict[int, int] = {}
         self._farewell: int | None = None
+        self._before: dict[int, Lists] | None = None
+        """What ``recall`` returns to: the lists of before the newest plan, until the next message."""
         self.since = self.refused = 0
 
     def receive_plan(self, now: int, system: int, payload: bytes) -> None:
@@ -82,6 +84,7 @@ class Agreements:
         settings (frame, dt, steps, epoch), is too far from ``now``, or differs from the stored plan of its
         epoch.
         """
+        self._before = None
         peer = self._heard(system)
         if peer is not None and peer.last_payload == payload:
             # Most payloads repeat the last one.
@@ -143,6 +146,7 @@ class Agreements:
 
     def receive_statement(self, now: int, system: int, statement: Statement) -> None:
         """Receive a statement of ``system``; refuse one of another fleet, or of a clock that is ahead."""
+        self._before = None
         if system == self.own:
             return
         if statement.fingerprint != self.fingerprint:
@@ -197,7 +201,7 @@ class Agreements:
 
     def begin(self, since: int) -> None:
         """Discard all agreements: the own plan of ``since`` (µs) does not begin on the one before."""
-        self.since, self._farewell = since, None
+        self.since, self._farewell, self._before = since, None, None
         self._plans.clear()
         for peer in self._everybody():
             peer.begin()
@@ -207,7 +211,7 @@ class Agreements:
 
         What others do until the own return may not be received, so each of them must be heard anew then.
         """
-        self._farewell, self._members = epoch, None
+        self._farewell, self._members, self._before = epoch, None, None
         for peer in self._everybody():
             peer.leave(epoch)
 
@@ -216,6 +220,7 @@ class Agreements:
         if self._farewell is None:
             return False
         self.since, self._farewell = self._farewell + self._config.epoch_us, None
+        self._before = None
         for peer in self._everybody():
             peer.begin()
         return True
@@ -225,14 +230,24 @@ class Agreements:
         newest = self._plans.newest
         if newest is not None and newest.plan is plan:
             return False
+        self._before = {system: peer.lists() for system, peer in self._peers.items()}
         self._plans.add(stored(plan), {epoch for peer in self._peers.values() for epoch in peer.needed()})
         return True
 
-    def recall(self, epoch: int) -> None:
-        """Discard the own plan of ``epoch`` (µs), which was never sent, and the proposals on it."""
+    def recall(self, epoch: int) -> bool:
+        """Discard the own plan of ``epoch`` (µs), the newest, and undo what was agreed since it was filed.
+
+        Nothing of this was sent, and what was taken since may rely on this plan. Returns False, and changes
+        nothing, if anything was received since, or the vehicle has begun anew or said farewell.
+        """
+        newest, before = self._plans.newest, self._before
+        if before is None or newest is None or newest.plan.epoch != epoch:
+            return False
         self._plans.remove(epoch)
-        for peer in self._everybody():
-            peer.recall(epoch)
+        self._before = None
+        for system, lists in before.items():
+            self._peers[system].undo(lists)
+        return True
 
     def update(self, now: int) -> None:
         """Take, propose and refuse agreements, with the own newest plan."""

@@ -433,18 +433,25 @@ class CertifiedFlight:
     def recall(self) -> bool:
         """Carry the plan on in place of the one that the last ``messages`` announced for the first time.
 
-        Call it if these messages are not sent. Returns False for the first plan since the vehicle has begun
-        anew, which is not recalled.
+        Call it if these messages are not sent. Returns False, and changes nothing, where a first plan is
+        announced since the vehicle has begun anew, the last one with a farewell, or a plan in space that was
+        a column: all of them rest where the vehicle is.
         """
-        before, self._unsent = self._unsent, None
-        following = self.commitment.following
-        if before is None or following is None:
-            return True
-        if following.epoch <= self.agreements.since:
-            return False
-        self.commitment.carry_on(HoldReason.LATE)
-        self.commitment.announced_until, self._next_announcement = before, 0
-        self.agreements.recall(following.epoch)
+        commitment, before = self.commitment, self._unsent
+        announced, following = commitment.announced(), commitment.following
+        if before is not None and announced is not None:
+            start = None if following is None else commitment.start()
+            released = start is not None and start.column and not announced.column
+            first = announced.epoch <= self.agreements.since
+            if released or first or not self.agreements.recall(announced.epoch):
+                return False
+            if start is not None and start != announced:
+                commitment.carry_on(HoldReason.LATE)
+                if not start.column:
+                    self.reservation.withdraw()
+            commitment.announced_until = before
+        # The statements, too, are to be repeated at once.
+        self._unsent, self._next_announcement = None, 0
         return True
 
     def _away(self, now: int) -> list[Message]:

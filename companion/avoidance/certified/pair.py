@@ -13,7 +13,7 @@ it with each message. Four rules hold the lists together.
    farewell, and makes no plan before a newer agreement is in both lists.
 
 So there is always an agreement in both lists, whatever messages are lost, late, repeated or out of order
-(docs/certified.md has the proof). No rule needs a time.
+(docs/certified.md has the proof). No rule needs a time. What was never sent can be undone (``undo``).
 """
 
 from __future__ import annotations
@@ -104,12 +104,9 @@ class Pair:
         if self.newer(one, self.considered):
             self.considered = one
 
-    def recall(self, own: int) -> None:
-        """Drop the agreements on the own plan of ``own`` (µs), which was never sent, nor were these.
-
-        They stay considered.
-        """
-        self.kept = tuple(one for one in self.kept if one.own != own)
+    def undo(self, kept: tuple[Agreement, ...], considered: Agreement) -> None:
+        """Return to the list ``kept`` and what was ``considered`` then: nothing was stated since."""
+        self.kept, self.considered = kept, considered
 
     def acknowledge(self, other: int) -> bool:
         """Count the peer's plan of ``other`` (µs) as considered, if none since its beginning was.

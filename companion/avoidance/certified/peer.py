@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from companion.avoidance.certified.agreed_planes import AgreedPlanes
 from companion.avoidance.certified.committed import carried_on
@@ -16,6 +17,14 @@ _SEEN = 8
 """Number of a peer's statements of which repetitions are recognised, which takes 0.6 µs instead of 7 µs."""
 _ROUND_TRIP_US = 200_000
 """Round trip (µs) that is assumed before one was measured."""
+
+
+class Lists(NamedTuple):
+    """Agreements with a peer at one time: the own list, the newest considered one, and their planes."""
+
+    kept: tuple[Agreement, ...]
+    considered: Agreement
+    agreed: dict[Agreement, AgreedPlanes]
 
 
 class Peer:
@@ -213,11 +222,15 @@ class Peer:
         self.agree(one, planes)
         self._proposed[one] = now
 
-    def recall(self, own: int) -> None:
-        """Drop the proposals on the own plan of ``own`` (µs), which was never sent, nor were these."""
-        self.pair.recall(own)
-        self.agreed = {one: planes for one, planes in self.agreed.items() if one.own != own}
-        self._proposed = {one: since for one, since in self._proposed.items() if one.own != own}
+    def lists(self) -> Lists:
+        """Return what ``undo`` returns to."""
+        return Lists(self.pair.kept, self.pair.considered, self.agreed)
+
+    def undo(self, lists: Lists) -> None:
+        """Return to earlier ``lists``: what was taken, proposed or dropped since was never stated."""
+        self.pair.undo(lists.kept, lists.considered)
+        self.agreed = lists.agreed
+        self._proposed = {one: since for one, since in self._proposed.items() if one in lists.kept}
         self.settled, self.changed = None, True
 
     def waiting(self, now: int) -> int | None:

@@ -103,6 +103,10 @@ class Reservation:
             self._since = now
         self.was_reserved = column and (self.was_reserved or self._lasts(now))
 
+    def withdraw(self) -> None:
+        """Forget the reservation of a column that was never sent."""
+        self._since, self.was_reserved = None, False
+
     def may_be_left(self) -> bool:
         """Return whether the column may become a plan in space, as far as the members are concerned.
 

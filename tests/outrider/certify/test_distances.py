@@ -19,10 +19,11 @@ axes = st.tuples(*[st.floats(0.2, 9.0)] * 3)
     drift=lengths,
     sigma=st.floats(0.0, 2.0),
     sigmas=st.floats(0.0, 4.0),
-    clock=st.integers(0, 100_000),
+    clock=st.integers(0, 90_000),
     fastest=axes,
     back=st.none() | axes,
     least=st.none() | st.floats(0.1, 2.0),
+    d_min=st.floats(0.1, 1.0),
 )
 def test_both_promise_the_same(
     tube: float,
@@ -33,10 +34,11 @@ def test_both_promise_the_same(
     fastest: tuple[float, float, float],
     back: tuple[float, float, float] | None,
     least: float | None,
+    d_min: float,
 ) -> None:
     certified = {"tube": tube, "drift": drift, "sigmas": sigmas, "clock_us": clock, "d_min_obstacle": least}
     limits = {"v_max": fastest, "v_min": None if back is None else tuple(-v for v in back)}
-    document = {"certified": certified, "limits": limits, "field": {"position_sigma": sigma}}
+    document = {"certified": certified, "limits": limits, "field": {"position_sigma": sigma, "d_min": d_min}}
     config = CompanionConfig.model_validate(document)
     parts = config.certified, config.field, config.limits
     assert of_plans(config) == pytest.approx(margins.between(*parts), rel=1e-12)

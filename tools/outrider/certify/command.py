@@ -51,10 +51,9 @@ def show(name: str, verdict: Verdict) -> None:
     pairs, nearest = verdict.pairs, verdict.pairs.nearest
     anchors = verdict.steps(Kind.ANCHOR)
     word = "certified" if verdict.certified else "not certified"
-    if verdict.certified and pairs.resting:
-        word = f"certified but for {pairs.resting} pairs after an anchor"
-    if verdict.certified and pairs.near:
-        word += f", and for the distance of {pairs.near} pairs that began too near"
+    exceptions = {"pairs of plans after an anchor": pairs.resting, "pairs that began too near": pairs.near}
+    if verdict.certified and any(exceptions.values()):
+        word += " but for " + " and ".join(f"{count} {what}" for what, count in exceptions.items() if count)
     table = Table(show_header=False)
     rows = {
         "vehicles": len(verdict.histories),

@@ -45,8 +45,8 @@ class Pairs(NamedTuple):
 
     ``checked`` is the number of pairs of plans checked. The others were not, because one of the two had said
     ``farewell`` or the pair was ``resting`` after an anchor. ``epochs`` (µs): all epochs of which a vehicle
-    has a plan. ``near`` is the number of pairs whose first plans were nearer than required, against
-    assumption (e): they need only come no nearer.
+    has a plan. ``near`` is the number of pairs of vehicles whose plans were nearer than required when they
+    began, or when one of them returned, against assumption (e): they need only come no nearer.
     """
 
     epochs: tuple[int, ...]
@@ -62,7 +62,7 @@ class _Pair:
     """Check of the distance between two vehicles' plans, from epoch to epoch."""
 
     def __init__(self, who: tuple[int, int], required: float) -> None:
-        self._who, self._required = who, required
+        self.who, self._required = who, required
         self._keeps = 0.0
         self._rests = False
         self.near: bool | None = None
@@ -83,7 +83,7 @@ class _Pair:
         if self.near is None:
             self.near = distance < self._required - SLACK
         if distance < self._keeps - SLACK:
-            here = Nearest(distance, self._who, epoch)
+            here = Nearest(distance, self.who, epoch)
             worst, since, count = self._breach or (here, epoch, 0)
             self._breach = min(worst, here), since, count + 1
         else:
@@ -99,7 +99,7 @@ class _Pair:
                 f"in {count} epoch{'s' * (count > 1)}, nearest {1e-6 * (worst.epoch - since):.1f} s later"
             )
             figures = f"{worst.distance:.6f} m, at least {self._keeps:.6f} m; {for_long}"
-            self.findings.append(Finding("plans nearer than certified", self._who, since, figures))
+            self.findings.append(Finding("plans nearer than certified", self.who, since, figures))
         self._breach = None
 
 
@@ -114,7 +114,8 @@ def check(histories: Sequence[History], terms: Terms, spans: Sequence[tuple[Span
     current: dict[int, WirePlan] = {}
     pairs: dict[tuple[int, int], _Pair] = {}
     findings: list[Finding] = []
-    checked = farewell = resting = near = 0
+    checked = farewell = resting = 0
+    near: set[tuple[int, int]] = set()
     nearest: Nearest | None = None
     for epoch in epochs:
         anchored = set()
@@ -132,7 +133,7 @@ def check(histories: Sequence[History], terms: Terms, spans: Sequence[tuple[Span
         farewell += len(current) * (len(current) - 1) // 2 - len(together)
         # A vehicle that returns after a farewell starts anew with all others.
         over = [pairs.pop(who) for who in set(pairs).difference(together)]
-        near += sum(pair.near is True for pair in over)
+        near |= {pair.who for pair in over if pair.near}
         findings += _concluded(over)
         columns = [(i in decides) + (j in decides) for i, j in together]
         distances = _distances(current, epoch, together, columns, terms)
@@ -145,9 +146,9 @@ def check(histories: Sequence[History], terms: Terms, spans: Sequence[tuple[Span
             checked += 1
             here = Nearest(distance, who, epoch)
             nearest = here if nearest is None else min(nearest, here)
-    near += sum(pair.near is True for pair in pairs.values())
+    near |= {pair.who for pair in pairs.values() if pair.near}
     findings += _concluded(pairs.values())
-    return Pairs(epochs, checked, farewell, resting, near, nearest, findings)
+    return Pairs(epochs, checked, farewell, resting, len(near), nearest, findings)
 
 
 def _distances(

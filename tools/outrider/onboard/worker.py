@@ -142,9 +142,10 @@ class Worker:
             copied = CopiedNode(
                 supervised, node, self._copies, clock, self._signing, lambda: supervised.last is not None
             )
-        withheld = 0
+        reported = 0
 
         def stepped(now: int) -> bool:
+            nonlocal reported
             alone = os.getppid() != self._parent or self._orders.alone
             if certified and (alone or self._orders.stop):
                 supervised.finish()
@@ -155,10 +156,9 @@ class Worker:
                     departures.take(now, message)
                 node.would.clear()
             news.look(now, wall.now())
-            nonlocal withheld
-            if copied is not None and copied.withheld > withheld:
-                withheld = copied.withheld
-                self._report_error("a step took so long that it sent nothing, and its plan is carried on")
+            if copied is not None and copied.withheld > reported:
+                reported = copied.withheld
+                self._report_error("a step took so long that its set-points and its plan were not sent")
             if certified and self._orders.stop and supervised.rested:
                 return True
             return supervised.last is not None and supervised.last.over
@@ -178,7 +178,8 @@ class Worker:
             try:
                 loop.run(lambda: self._orders.stop and not certified, stepped)
             finally:
-                self._leave(loop, news, departures, 1.0 if followed is None else followed.rate, withheld)
+                rate = 1.0 if followed is None else followed.rate
+                self._leave(loop, news, departures, rate, 0 if copied is None else copied.withheld)
 
     def _leave(
         self,

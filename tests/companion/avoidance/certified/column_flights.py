@@ -59,6 +59,9 @@ def at_random(seed: int, rough: Rough) -> Swarm:
         if rng.random() < 0.2:
             begin = int(rng.integers(0, 5_000_000))
             habits[k] = habits[k]._replace(frozen=((begin, begin + int(rng.integers(20_000, 2_000_000))),))
+        if rng.random() < 0.3:
+            begins = rng.integers(0, 5_000_000, 4).tolist()
+            habits[k] = habits[k]._replace(stalls=tuple((b, b + 700_000) for b in sorted(begins)))
     return fly(habits, rough, seed)
 
 

@@ -78,7 +78,7 @@ class Swarm(Flown):
                 messages = vehicle.step(since, goals(since, vehicle.system))
                 if vehicle.stall(since):
                     messages = []
-                vehicle.note(sent=bool(messages))
+                vehicle.note(messages)
                 self.send(vehicle.busy_until, vehicle, messages)
                 self.record(since, vehicle)
 

@@ -1,4 +1,4 @@
-"""A process that stops inside its step: no plan is told after it was to begin, and none such is flown."""
+"""A process that stops inside its step for long tells no plan that was to begin meanwhile, and flies none."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.committed import carried_on
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.values.horizon import Array
@@ -64,6 +65,11 @@ def test_a_plan_that_is_not_recalled_is_found(monkeypatch: pytest.MonkeyPatch) -
     assert any("another plan than that of the backup node" in stalling(seed).faults() for seed in range(8))
 
 
+def test_a_recalled_plan_that_stays_filed_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Agreements, "recall", lambda self, epoch: True)
+    assert any("other plans than those that are flown" in stalling(seed).faults() for seed in range(8))
+
+
 class Others(SimulatedClock):
     """A clock by which the other vehicles of ``swarm`` act whenever it advances."""
 
@@ -77,7 +83,7 @@ class Others(SimulatedClock):
             super().wait_until(EPOCH + since)
             for vehicle in self._swarm.vehicles[1:]:
                 messages = vehicle.step(since, swap(since, vehicle.system))
-                vehicle.note(sent=bool(messages))
+                vehicle.note(messages)
                 self._swarm.send(since, vehicle, messages)
                 self._swarm.record(since, vehicle)
         super().wait_until(instant)
@@ -93,8 +99,8 @@ class Radio:
         self._codec = Codec()
         self.told: list[tuple[int, WirePlan]] = []
         """Plans, and when (µs of the run) each was told."""
-        self.sent = False
-        """Whether anything was sent since this was last set to False."""
+        self.sent: list[Tunnel] = []
+        """What was sent since this was last emptied."""
 
     def fileno(self) -> None:
         return None
@@ -103,9 +109,10 @@ class Radio:
         return []
 
     def send(self, data: bytes) -> None:
-        since, self.sent = self._clock.now() - EPOCH, True
+        since = self._clock.now() - EPOCH
         messages = [message for message in self._codec.feed(data) if isinstance(message, Tunnel)]
         self._swarm.send(since, self._swarm.vehicles[0], messages)
+        self.sent += messages
         plans = [unpack_plan(message.payload) for message in messages if message.payload_type == PLAN]
         self.told += [(since, plan) for plan in plans]
 
@@ -162,9 +169,9 @@ def in_real_time(seed: int) -> tuple[Swarm, Radio]:
     flying = CopiedNode(node, node, cast(Any, copies), clock)
 
     def noted(now: int) -> bool:
-        swarm.vehicles[0].note(sent=radio.sent)
+        swarm.vehicles[0].note(radio.sent)
         swarm.record(now - EPOCH, swarm.vehicles[0])
-        radio.sent = False
+        radio.sent.clear()
         return now >= EPOCH + UNTIL
 
     loop = RealTime(Scheduled(flying, TICK, 4_000), {"swarm": radio}, clock)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from heapq import heappop
 from typing import NamedTuple
 
@@ -20,7 +20,9 @@ from companion.world import View, World
 from mavlink_bridge.messages import Source, Tunnel
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
 from mavlink_bridge.wire.agreements import unpack
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
 from mavlink_bridge.wire.plan import WirePlan
+from mavlink_bridge.wire.plan import unpack as unpack_plan
 from tests.companion.avoidance.certified.plans import DT, EPOCH, STEPS
 from tests.companion.avoidance.certified.rough import CLIMB, FLEET, NEVER, Habits, within
 
@@ -111,13 +113,15 @@ class Vehicle:
             self.stalled.append((since, self.busy_until, self.plans[max(self.plans)]))
         return recalled
 
-    def note(self, *, sent: bool) -> None:
-        """Record what it flies after a step, and whether that ``sent`` anything."""
+    def note(self, sent: Sequence[Tunnel]) -> None:
+        """Record what it flies after a step that ``sent`` these messages, and the plans among them."""
         commitment = self.flight.commitment
         # Before its first plan, a companion that has restarted flies what the one before has told.
         first = self.flight.agreements.since if self._restarted else 0
-        for plan in (commitment.current, commitment.following):
-            if plan is not None and plan.epoch >= first and (self.plans or sent):
+        told = [unpack_plan(message.payload) for message in sent if message.payload_type == PLAN]
+        flown = (commitment.current, commitment.following) if self.plans or sent else ()
+        for plan in (*told, *flown):
+            if plan is not None and plan.epoch >= first:
                 self.contradictions += self.plans.setdefault(plan.epoch, plan) != plan
 
     def _at(self, height: float) -> Motion:
