@@ -215,7 +215,7 @@ class Companion:
         For a step that took so long that its set-points are old and its committed plan may have to have begun
         by now: the plan of before is carried on, as the backup node does. Returns False in field mode, and
         for a plan that cannot be recalled. Plans, statements and commands are repeated by later steps;
-        replies to TIMESYNC, detections and status texts that are left unsent are lost.
+        replies to TIMESYNC, detections and status texts are lost, and messages of fleet time come later.
         """
         return self._acted and self.avoidance.recall()
 

@@ -433,9 +433,9 @@ class CertifiedFlight:
     def recall(self) -> bool:
         """Carry the plan on in place of the one that the last ``messages`` announced for the first time.
 
-        Call it if these messages are not sent. Returns False, and changes nothing, where a first plan is
-        announced since the vehicle has begun anew, the last one with a farewell, or a plan in space that was
-        a column: all of them rest where the vehicle is.
+        Call it if these messages are not sent. Returns False, and changes nothing, for a plan with which the
+        vehicle begins anew, for a farewell, and for a plan in space that was a column. The last two go on
+        with the plan before; after an anchor the vehicle is beside its new plan until it has followed.
         """
         commitment, before = self.commitment, self._unsent
         announced, following = commitment.announced(), commitment.following
@@ -447,8 +447,8 @@ class CertifiedFlight:
                 return False
             if start is not None and start != announced:
                 commitment.carry_on(HoldReason.LATE)
-                if not start.column:
-                    self.reservation.withdraw()
+            if self.agreements.unreserved() or not commitment.column:
+                self.reservation.withdraw()
             commitment.announced_until = before
         # The statements, too, are to be repeated at once.
         self._unsent, self._next_announcement = None, 0

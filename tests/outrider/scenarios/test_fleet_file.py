@@ -64,7 +64,7 @@ sigmas, tubes = st.floats(0.0, 5.0), st.floats(0.001, 100.0)
 @given(
     st.sets(st.integers(1, 250), min_size=2).map(tuple),
     tubes,
-    st.integers(0, 100_000),
+    st.integers(0, 99_999),
     sigmas,
     st.floats(-89.0, 89.0),
     st.floats(0.01, 30.0),

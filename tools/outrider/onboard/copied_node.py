@@ -57,7 +57,8 @@ class CopiedNode:
         """Step the node at ``now`` (µs), and copy what it is about to send."""
         leaving = self._inner.step(now, inbox)
         late = self._clock.now() - now > self._longest
-        if late and leaving and not self._holds() and self._companion.recall():
+        to_vehicles = any(datagram.link in LINKS for datagram in leaving)
+        if late and to_vehicles and not self._holds() and self._companion.recall():
             self.withheld += 1
             leaving = [datagram for datagram in leaving if datagram.link not in LINKS]
         sent = dict.fromkeys(LINKS, b"")

@@ -12,6 +12,7 @@ import pytest
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.committed import carried_on
 from companion.avoidance.certified.flight import CertifiedFlight
+from companion.avoidance.certified.pair import Agreement
 from companion.values.horizon import Array
 from mavlink_bridge.clocks.clock import SimulatedClock
 from mavlink_bridge.links.link import LinkCounters
@@ -21,12 +22,13 @@ from mavlink_bridge.messages import Tunnel
 from mavlink_bridge.node import Datagram
 from mavlink_bridge.wire.codec import Codec
 from mavlink_bridge.wire.plan import PAYLOAD_TYPE as PLAN
-from mavlink_bridge.wire.plan import WirePlan
+from mavlink_bridge.wire.plan import WirePlan, pack
 from mavlink_bridge.wire.plan import unpack as unpack_plan
 from outrider.onboard.copied_node import CopiedNode
 from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.rough import Habits, Rough
 from tests.companion.avoidance.certified.swarm import TICK, Swarm
+from tests.companion.avoidance.certified.two import LENGTH, NOW, OTHER, agreed, epoch, plan
 
 STALL = 700_000
 """µs."""
@@ -68,6 +70,29 @@ def test_a_plan_that_is_not_recalled_is_found(monkeypatch: pytest.MonkeyPatch) -
 def test_a_recalled_plan_that_stays_filed_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Agreements, "recall", lambda self, epoch: True)
     assert any("other plans than those that are flown" in stalling(seed).faults() for seed in range(8))
+
+
+def test_what_is_recalled_never_was() -> None:
+    """A plan is filed, an offer taken that replaces an agreement, and another one proposed."""
+    two = agreed()
+    mine, peer = two.first, two.first._peers[OTHER]
+    before = peer.pair.kept, peer.pair.considered, dict(peer.agreed), mine._plans.newest
+    mine.made(plan(1))
+    peer.agree(Agreement(epoch(0), epoch(1)), before[2][before[0][-1]])
+    peer.propose(NOW, Agreement(epoch(1), epoch(1)), before[2][before[0][-1]])
+    assert peer.pair.kept != before[0]
+    assert mine.recall(epoch(1))
+    assert (peer.pair.kept, peer.pair.considered, peer.agreed, mine._plans.newest) == before
+    assert peer.changed
+    assert peer.waiting(NOW) is None
+    assert not mine.recall(epoch(1))
+
+
+def test_nothing_is_recalled_once_a_message_was_received() -> None:
+    two = agreed()
+    two.first.made(plan(1))
+    two.first.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, 4.0)))
+    assert not two.first.recall(epoch(1))
 
 
 class Others(SimulatedClock):
@@ -119,12 +144,12 @@ class Radio:
     def late(self) -> list[int]:
         """How long (µs) after its beginning each plan was told that is none of before, carried on."""
         found, known = [], {}
-        for since, plan in self.told:
-            known.setdefault(plan.epoch, plan)
-            before = known.get(max((one for one in known if one < plan.epoch), default=0))
-            carried = before and carried_on(before, (plan.epoch - before.epoch) // before.dt)
-            if known[plan.epoch] is plan and plan != carried:
-                found.append(since - (plan.epoch - EPOCH))
+        for since, one in self.told:
+            known.setdefault(one.epoch, one)
+            before = known.get(max((epoch for epoch in known if epoch < one.epoch), default=0))
+            carried = before and carried_on(before, (one.epoch - before.epoch) // before.dt)
+            if known[one.epoch] is one and one != carried:
+                found.append(since - (one.epoch - EPOCH))
         return found
 
     def close(self) -> None:
