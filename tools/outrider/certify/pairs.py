@@ -62,7 +62,7 @@ class _Pair:
     """Check of the distance between two vehicles' plans, from epoch to epoch."""
 
     def __init__(self, who: tuple[int, int], required: float) -> None:
-        self.who, self._required = who, required
+        self._who, self._required = who, required
         self._keeps = 0.0
         self._rests = False
         self.near: bool | None = None
@@ -83,7 +83,7 @@ class _Pair:
         if self.near is None:
             self.near = distance < self._required - SLACK
         if distance < self._keeps - SLACK:
-            here = Nearest(distance, self.who, epoch)
+            here = Nearest(distance, self._who, epoch)
             worst, since, count = self._breach or (here, epoch, 0)
             self._breach = min(worst, here), since, count + 1
         else:
@@ -99,7 +99,7 @@ class _Pair:
                 f"in {count} epoch{'s' * (count > 1)}, nearest {1e-6 * (worst.epoch - since):.1f} s later"
             )
             figures = f"{worst.distance:.6f} m, at least {self._keeps:.6f} m; {for_long}"
-            self.findings.append(Finding("plans nearer than certified", self.who, since, figures))
+            self.findings.append(Finding("plans nearer than certified", self._who, since, figures))
         self._breach = None
 
 
@@ -132,9 +132,7 @@ def check(histories: Sequence[History], terms: Terms, spans: Sequence[tuple[Span
         together = list(combinations(there, 2))
         farewell += len(current) * (len(current) - 1) // 2 - len(together)
         # A vehicle that returns after a farewell starts anew with all others.
-        over = [pairs.pop(who) for who in set(pairs).difference(together)]
-        near |= {pair.who for pair in over if pair.near}
-        findings += _concluded(over)
+        findings += _concluded(pairs.pop(who) for who in set(pairs).difference(together))
         columns = [(i in decides) + (j in decides) for i, j in together]
         distances = _distances(current, epoch, together, columns, terms)
         for (i, j), distance in zip(together, distances, strict=True):
@@ -144,9 +142,10 @@ def check(histories: Sequence[History], terms: Terms, spans: Sequence[tuple[Span
                 resting += 1
                 continue
             checked += 1
+            if pair.near:
+                near.add(who)
             here = Nearest(distance, who, epoch)
             nearest = here if nearest is None else min(nearest, here)
-    near |= {pair.who for pair in pairs.values() if pair.near}
     findings += _concluded(pairs.values())
     return Pairs(epochs, checked, farewell, resting, len(near), nearest, findings)
 

@@ -56,11 +56,11 @@ class CopiedNode:
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Step the node at ``now`` (µs), and copy what it is about to send."""
         leaving = self._inner.step(now, inbox)
-        late = self._clock.now() - now > self._longest
-        to_vehicles = any(datagram.link in LINKS for datagram in leaving)
-        if late and to_vehicles and not self._holds() and self._companion.recall():
-            self.withheld += 1
-            leaving = [datagram for datagram in leaving if datagram.link not in LINKS]
+        if self._clock.now() - now > self._longest:
+            others = [datagram for datagram in leaving if datagram.link not in LINKS]
+            if len(others) < len(leaving) and not self._holds() and self._companion.recall():
+                self.withheld += 1
+                leaving = others
         sent = dict.fromkeys(LINKS, b"")
         for link, data in leaving:
             if link in sent:
