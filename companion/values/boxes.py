@@ -3,7 +3,8 @@
 In the frame of a box, of its centre and axes, the nearest point of a point outside is that point clipped to
 the box; inside, it lies on the nearest face. Boxes are sorted into tiles of neighbouring ones
 (S. Leutenegger, M. Lopez, J. Edgington, "STR", 1997), so only the rectangles of the tiles and the boxes of
-near tiles are looked at.
+near tiles are looked at. The tiles are arrays, because the compiled kernels that search them cannot call the
+tree of a library, which is an object of Python.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import pytest
 from outrider.compare.cells import cells_of
 from outrider.compare.command import compare
 from outrider.compare.comparison import Comparison
-from outrider.compare.results import result_of
+from outrider.compare.results import faults, result_of
 from outrider.compare.table import lines, markdown
 from outrider.errors import InputError
 from outrider.resources import config_root, find
@@ -34,7 +34,8 @@ def flight(**changes: Any) -> dict[str, Any]:
         "separation_m": 0.5,
         "obstacle_m": None,
     }
-    return {**found, "held_epochs": 0, "solver_failures": 0, "failure": None, **changes}
+    found |= {"held_epochs": 0, "solver_failures": 0, "d_min_violations": 0, "processor": "one"}
+    return {**found, "failure": None, **changes}
 
 
 def fly(task: Task) -> dict[str, Any]:
@@ -77,9 +78,33 @@ def test_collisions_late_flights_and_faults_are_no_success() -> None:
     assert slow.reaches_bar is False
     *published, ours = lines(comparison, fine)
     assert [words[0] for words in published] == [row.label] * len(published)
-    assert ours[2] == "2 of 2"
+    assert ours[2:4] == ("50 ms, 0 %", "2 of 2")
+    assert ours[-1] == "mean 6.8, all 6.8, success 100 %: reached"
     text = markdown(comparison, [fine])
     assert all(one in text for one in comparison.differences)
+    assert all(one.source in text for one in comparison.published)
+    assert "plans on an i7" in text
+    assert "plans of this table on one" in text
+
+
+def test_a_violation_of_the_own_distance_misses_every_bar() -> None:
+    """Also where the authors count no collision."""
+    comparison = load(find("comparisons", "hdsm-circle"), Comparison)
+    (row,) = comparison.rows
+    for violations, reached in ((0, True), (1, False)):
+        flights = entries(flight(), flight(d_min_violations=violations, separation_m=0.7))
+        flights[0].summary["separation_m"] = 0.7
+        found = result_of(comparison, row, LINKS, ("point", "point"), flights)
+        assert (found.succeeded, found.violations, found.reaches_bar) == (2, violations, reached)
+        assert bool(faults(flights[1], comparison.measure)) is not reached
+
+
+def test_published_times_to_the_last_arrival_stand_beside_ours() -> None:
+    """RMADER's repository has times of whole flights, so they are no means over vehicles."""
+    comparison = load(find("comparisons", "rmader"), Comparison)
+    of_repository = [one for one in comparison.published if "mit-acl/rmader" in one.source]
+    assert of_repository
+    assert all(one.mean_s is None and one.last_s is not None for one in of_repository)
 
 
 def test_who_touches_an_obstacle_collided_and_the_last_arrivals_have_a_bar() -> None:
@@ -137,6 +162,8 @@ def test_faults_are_refused_before_anything_flies(tmp_path: Path) -> None:
         compare("maze-dense", worlds=tmp_path, out=tmp_path / "out")
     with pytest.raises(InputError, match="did you mean 'rmader'"):
         compare("rmade", out=tmp_path / "out")
+    with pytest.raises(InputError, match="--jobs does not go with --scheduler"):
+        compare("rmader", jobs=1, scheduler="tcp://127.0.0.1:1", out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -9,6 +9,12 @@ import typer
 
 from outrider.commands.options import AsJson, Begun, Jobs, shipped
 
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Fly on the workers of a Dask scheduler: tcp://HOST:PORT."),
+]
+WallLimit = Annotated[float, typer.Option(min=1.0, help="Maximum wall time of one run, s.")]
+
 
 def sweep(
     name: Annotated[
@@ -18,11 +24,8 @@ def sweep(
     runs: Annotated[int | None, typer.Option(min=1, max=1_000_000, help="Seeds per cell.")] = None,
     jobs: Jobs = None,
     out: Begun = None,
-    wall_limit: Annotated[float, typer.Option(min=1.0, help="Maximum wall time of one run, s.")] = 1800.0,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Fly on the workers of a Dask scheduler: tcp://HOST:PORT."),
-    ] = None,
+    wall_limit: WallLimit = 1800.0,
+    scheduler: Scheduler = None,
     regressions: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Write every run that failed there, as a scenario."),
@@ -84,13 +87,29 @@ def compare(
     ] = False,
     jobs: Jobs = None,
     out: Begun = None,
+    wall_limit: WallLimit = 1800.0,
+    scheduler: Scheduler = None,
     as_json: AsJson = False,
 ) -> None:
     """Fly the scene of a published planner with its limits, and show ours beside the published figures."""
     from outrider.compare.command import compare as comparing
 
     chosen = tuple(row or ())
-    raise typer.Exit(comparing(name, seeds, jobs, out, as_json, chosen, missions, worlds, physics=physics))
+    raise typer.Exit(
+        comparing(
+            name,
+            seeds,
+            jobs,
+            out,
+            as_json,
+            chosen,
+            missions,
+            worlds,
+            physics=physics,
+            scheduler=scheduler,
+            wall_limit_s=wall_limit,
+        )
+    )
 
 
 def gallery(

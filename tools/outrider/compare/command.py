@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from outrider.compare import picture, table
+from outrider.compare import failed_flights, picture, table
 from outrider.compare.cells import cells_of
 from outrider.compare.comparison import Comparison, Row
 from outrider.compare.flying import RUN, TRACED
 from outrider.compare.physics import in_physics
-from outrider.compare.results import Result, result_of
+from outrider.compare.results import Result, faults, result_of
 from outrider.compare.scene import Scene, scenario_of
 from outrider.errors import InputError
 from outrider.interruption import INTERRUPTED
@@ -21,7 +22,8 @@ from outrider.runs import whole_file
 from outrider.sweep import directory as places
 from outrider.sweep.cells import Cell
 from outrider.sweep.comparison import Flown, flown
-from outrider.sweep.execution import header
+from outrider.sweep.execution import WALL_LIMIT_S, header
+from outrider.sweep.workers import Machines
 from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
@@ -40,17 +42,21 @@ def compare(
     run: str = RUN,
     *,
     physics: bool = False,
+    scheduler: str | None = None,
+    wall_limit_s: float = WALL_LIMIT_S,
 ) -> int:
     """Fly the comparison ``name``, a file or a shipped one, and return the exit status.
 
-    The status is 0 if every flight succeeded, 1 if one did not, and 3 after an interruption. A missed bar is
-    a result, not an error. ``rows``: labels to fly, or beginnings of labels; by default all. The tables have
+    The status is 0 if every flight succeeded and kept its own d_min, 1 if one did not, and 3 after an
+    interruption. A missed bar is a result, not an error. ``jobs``, ``scheduler``, ``wall_limit_s``: see
+    ``Machines``. ``rows``: labels to fly, or beginnings of labels; by default all. The tables have
     these rows, and all others of which each seed is in the journal already. ``missions``: a
     folder with mission files of LSC's planners, in place of drawn ones; ``worlds``: one with their world
     files. ``physics``: with the vehicle of the comparison's part ``physics`` (``in_physics``). Writes
     ``compare.json``, ``compare.md`` and ``compare.png`` beside the journal in ``out`` (default
-    ``runs/sweep-compare-NAME``, in full physics ``…-physics``).
+    ``runs/sweep-compare-NAME``, in full physics ``…-physics``), and the scenarios of flights that failed.
     """
+    machines = Machines(jobs, scheduler, wall_limit_s)
     path = find("comparisons", name)
     comparison = load(path, Comparison)
     if physics and worlds is not None:
@@ -72,7 +78,8 @@ def compare(
     title = f"compare-{comparison.name}"
     folder = places.prepare(out, title)
     numbers = range(TRACED, TRACED + count)
-    entries = flown(header(title, every), [cells[row.label] for row in chosen], numbers, folder, run, jobs)
+    of_rows = [cells[row.label] for row in chosen]
+    entries = flown(header(title, every), of_rows, numbers, folder, run, machines)
     if entries is None:
         return INTERRUPTED
     shown = [row for row in rows_of if row in chosen or _is_flown(cells[row.label], entries, numbers)]
@@ -80,17 +87,7 @@ def compare(
     results = [
         _result(comparison, row, cell, entries, numbers) for row, cell in zip(shown, found, strict=True)
     ]
-    document: dict[str, Any] = {
-        "comparison": comparison.name,
-        "description": comparison.description,
-        "measure": comparison.measure.model_dump(),
-        "goal_radius_m": comparison.goal_radius,
-        "rows": [result.document() for result in results],
-        "published": [
-            one.model_dump() for one in comparison.published if one.row in {row.label for row in shown}
-        ],
-        "differences": list(comparison.unlike),
-    }
+    document = _document(comparison, results)
     whole_file.write(folder / DOCUMENT, json.dumps(document, indent=2) + "\n")
     whole_file.write(folder / MARKDOWN, table.markdown(comparison, results))
     _draw(comparison, found, entries, folder)
@@ -99,7 +96,14 @@ def compare(
     else:
         table.show(comparison, results)
     sys.stderr.write(f"table, Markdown and picture: {folder}\n")
-    return 0 if all(result.succeeded == result.seeds for result in results) else 1
+    failed = [
+        (cell, seed, wrong)
+        for cell in found
+        for seed in numbers
+        if (wrong := faults(entries[cell.key, seed], comparison.measure))
+    ]
+    _report(failed, folder)
+    return 1 if failed else 0
 
 
 def _chosen(comparison: Comparison, labels: tuple[str, ...]) -> tuple[Row, ...]:
@@ -123,6 +127,28 @@ def _result(comparison: Comparison, row: Row, cell: Cell, entries: Flown, number
     vehicle = VehicleConfig.model_validate_json(cell.vehicle, strict=True)
     of_row = [entries[cell.key, seed] for seed in numbers]
     return result_of(comparison, row, scene.scenario["links"], (vehicle.name, vehicle.motion), of_row)
+
+
+def _document(comparison: Comparison, results: Sequence[Result]) -> dict[str, Any]:
+    """Return the results, and the published figures of their rows, as values of JSON."""
+    labels = {result.row for result in results}
+    return {
+        "comparison": comparison.name,
+        "description": comparison.description,
+        "measure": comparison.measure.model_dump(),
+        "goal_radius_m": comparison.goal_radius,
+        "rows": [result.document() for result in results],
+        "published": [one.model_dump() for one in comparison.published if one.row in labels],
+        "differences": list(comparison.unlike),
+    }
+
+
+def _report(failed: Sequence[tuple[Cell, int, list[str]]], folder: Path) -> None:
+    """Name the flights that failed, each a cell, a seed and its faults, and write their scenarios."""
+    for cell, seed, wrong in failed:
+        sys.stderr.write(f"failed: {cell.label}, seed {seed}: {'; '.join(wrong)}\n")
+    if files := failed_flights.write(folder, failed):
+        sys.stderr.write(f"scenarios of {len(files)} failed flights: {folder / failed_flights.FOLDER}\n")
 
 
 def _draw(comparison: Comparison, found: list[Cell], entries: Flown, folder: Path) -> None:

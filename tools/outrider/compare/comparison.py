@@ -56,7 +56,7 @@ class Missions(Part):
 
 
 class Bar(Part):
-    """What a row shall reach."""
+    """What a row shall reach, without a violation of its own distances in any case."""
 
     mean_s: Figure | None = Field(None, description="s, mean time of arrival at most")
     last_s: Figure | None = Field(None, description="s, last arrival at most, mean over the flights")
@@ -82,7 +82,9 @@ class Published(Part):
     planner: Text = Field(description="name of the planner")
     row: Text = Field(description="label of a row of this file")
     success: Share | None = Field(None, description="share of the flights without a collision that arrive")
-    mean_s: Figure | None = Field(None, description="s, mean time")
+    mean_s: Figure | None = Field(
+        None, description="s, mean time, of a vehicle or of which it is not said whose it is"
+    )
     last_s: Figure | None = Field(None, description="s, time until all have arrived, mean over the flights")
     worst_s: Figure | None = Field(None, description="s, longest time")
     path_m: Figure | None = Field(None, description="m, length of a path")
@@ -90,6 +92,7 @@ class Published(Part):
     jerk2: Figure | None = Field(None, description="m²/s⁵, ∫j² of a vehicle")
     stops: Figure | None = Field(None, description="number of stops of a vehicle")
     plan_ms: Figure | None = Field(None, description="ms, time of a plan")
+    processor: Text | None = Field(None, description="what worked out the plans, as published")
     runs: int | None = Field(None, ge=1, description="number of flights")
     source: Text = Field(description="where it was published, or read")
     note: str = Field("", max_length=400, description="what to know of these figures")

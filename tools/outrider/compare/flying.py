@@ -9,6 +9,7 @@ import numpy as np
 
 from outrider.compare.measures import document, figures
 from outrider.compare.scene import Scene, scenario_of
+from outrider.processes.processor import processor
 from outrider.resources import config_root
 from outrider.runs.outcome import Outcome
 from outrider.simulation.flight import Flight
@@ -23,7 +24,10 @@ _SAMPLES_PER_POINT = 5
 
 
 def fly(task: Task) -> dict[str, Any]:
-    """Fly a task without files; return its figures. All but the CPU times are the same for the same task."""
+    """Fly a task without files; return its figures.
+
+    All but the CPU times and the processor are the same for the same task.
+    """
     scene = Scene.model_validate_json(task.document)
     vehicle = VehicleConfig.model_validate_json(task.vehicle, strict=True)
     flight = Flight(
@@ -41,6 +45,7 @@ def fly(task: Task) -> dict[str, Any]:
     obstacle = outcome.truth.obstacles.minimum
     found |= {"obstacle_m": round(float(obstacle), 4) if np.isfinite(obstacle) else None}
     found |= {"d_min_violations": outcome.truth.vehicles.count, "failure": outcome.failure}
+    found |= {"processor": processor()}
     return {**found, "trace": _trace(outcome)} if task.seed == TRACED else found
 
 

@@ -8,7 +8,7 @@ from math import isfinite
 from statistics import fmean, median
 from typing import Any
 
-from outrider.compare.comparison import Comparison, Row
+from outrider.compare.comparison import Comparison, Measure, Row
 from outrider.sweep.tasks import Entry
 
 
@@ -20,7 +20,8 @@ class Result:
     have no flight. Times (s) are of flights in which all vehicles arrive: ``mean_s`` over vehicles and
     flights, ``last_s`` the mean over flights of the last arrival, ``worst_s`` the longest. ``separation_m``:
     least of all flights in the scene's measure; ``obstacle_m``: least from a surface. ``plan_ms_p50``,
-    ``plan_ms_p99``: medians of the flights.
+    ``plan_ms_p99``: medians of the flights, measured on ``processors``. ``violations``: number of times that
+    two vehicles came nearer than the scenario's own d_min.
     """
 
     row: str
@@ -45,8 +46,10 @@ class Result:
     most_jerk: float | None
     plan_ms_p50: float | None
     plan_ms_p99: float | None
+    processors: tuple[str, ...]
     held_epochs: int
     solver_failures: int
+    violations: int
     delay_ms: float
     loss: float
     reaches_bar: bool | None
@@ -74,14 +77,9 @@ def result_of(
     """
     flights = [entry.summary for entry in entries if entry.summary is not None]
     measure = comparison.measure
-    collided = [
-        one
-        for one in flights
-        if _below(one["separation_m"], measure.least) or _below(one["obstacle_m"], measure.obstacle)
-    ]
-    late = [one for one in flights if one["arrived"] < one["vehicles"]]
-    fine = [one for one in flights if one not in collided and one not in late and not one["failure"]]
-    there = [one for one in flights if one not in late]
+    collided = [one for one in flights if _collisions(one, measure)]
+    there = [one for one in flights if not _late(one)]
+    fine = [one for one in there if not _collisions(one, measure) and not one["failure"]]
     found = Result(
         row=row.label,
         vehicle=vehicle[0],
@@ -89,7 +87,7 @@ def result_of(
         seeds=len(entries),
         succeeded=len(fine),
         collided=len(collided),
-        not_arrived=len(late),
+        not_arrived=len(flights) - len(there),
         failed=len(entries) - len(flights),
         mean_s=_mean(there, "mean_s"),
         last_s=_mean(there, "last_s"),
@@ -105,13 +103,44 @@ def result_of(
         most_jerk=_most(flights, "most_jerk"),
         plan_ms_p50=_middle(flights, "plan_ms_p50"),
         plan_ms_p99=_middle(flights, "plan_ms_p99"),
+        processors=tuple(sorted({one["processor"] for one in flights})),
         held_epochs=sum(one["held_epochs"] for one in flights),
         solver_failures=sum(one["solver_failures"] for one in flights),
+        violations=sum(one["d_min_violations"] for one in flights),
         delay_ms=float(links["swarm"]["delay_ms"]),
         loss=float(links["swarm"]["loss"]),
         reaches_bar=None,
     )
     return replace(found, reaches_bar=_reaches(row, found))
+
+
+def faults(entry: Entry, measure: Measure) -> list[str]:
+    """Return what is wrong with a flight, a clause each; nothing if it succeeded and kept its own d_min."""
+    flight = entry.summary
+    if flight is None:
+        return [" ".join((entry.what or entry.status).split())]
+    found = _collisions(flight, measure) + _late(flight)
+    if flight["d_min_violations"]:
+        found.append(f"{flight['d_min_violations']} violations of d_min")
+    return [*found, str(flight["failure"])] if flight["failure"] else found
+
+
+def _collisions(flight: Mapping[str, Any], measure: Measure) -> list[str]:
+    """Return a clause for each distance below which the authors count a collision."""
+    pairs = (
+        ("two vehicles", flight["separation_m"], measure.least),
+        ("a vehicle and an obstacle", flight["obstacle_m"], measure.obstacle),
+    )
+    return [
+        f"{what} came to {apart:g} m, where {least:g} m is a collision ({measure.kind})"
+        for what, apart, least in pairs
+        if apart is not None and least is not None and apart < least
+    ]
+
+
+def _late(flight: Mapping[str, Any]) -> list[str]:
+    arrived, of = flight["arrived"], flight["vehicles"]
+    return [f"{arrived} of {of} arrived"] if arrived < of else []
 
 
 def _reaches(row: Row, found: Result) -> bool | None:
@@ -121,11 +150,7 @@ def _reaches(row: Row, found: Result) -> bool | None:
     bar = row.bar
     pairs = ((bar.mean_s, found.mean_s), (bar.last_s, found.last_s), (bar.plan_ms, found.plan_ms_p50))
     good = all(most is None or (value is not None and value <= most) for most, value in pairs)
-    return good and found.success >= bar.success
-
-
-def _below(distance: float | None, least: float | None) -> bool:
-    return distance is not None and least is not None and distance < least
+    return good and found.success >= bar.success and not found.violations
 
 
 def _values(flights: Sequence[Mapping[str, Any]], name: str) -> list[float]:

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 from rich.console import Console
 from rich.table import Table
 
-from outrider.compare.comparison import Comparison, Published
+from outrider.compare.comparison import Bar, Comparison, Published
 from outrider.compare.results import Result
 
-WIDTH = 160
+WIDTH = 200
 _HEADS = (
     "row",
     "planner",
+    "delay, loss",
     "success",
     "mean, s",
     "all, s",
@@ -23,7 +24,9 @@ _HEADS = (
     "path, m",
     "∫a²",
     "∫j²",
+    "j, m/s³",
     "stops",
+    "own d_min",
     "plan, ms",
     "bar",
 )
@@ -53,7 +56,9 @@ def caption(comparison: Comparison) -> str:
         limits += f", none is nearer to an obstacle than {measure.obstacle:g} m"
     return (
         f"success: all arrive {limits} ({measure.kind}); mean over vehicles; all: last arrival, mean over"
-        f" flights; worst: last arrival of all flights; plan: CPU time, p50 / p99; {_NOTHING}: not published"
+        " flights; worst: last arrival of all flights; j: largest jerk on an axis; own d_min: violations of"
+        " the distance of our plans; plan: CPU time, p50 / p99, theirs as published; delay and loss: of"
+        f" messages between vehicles; {_NOTHING}: not published, or does not exist"
     )
 
 
@@ -61,8 +66,9 @@ def markdown(comparison: Comparison, results: Sequence[Result]) -> str:
     """Return the same table as Markdown, with the sources of the published figures."""
     rows = [" | ".join(_HEADS), " | ".join("---" for _ in _HEADS)]
     rows += [" | ".join(words) for result in results for words in lines(comparison, result)]
-    sources = dict.fromkeys(f"{one.planner}: {one.source}" for one in comparison.published)
-    notes = [*(f"- {text}" for text in comparison.unlike), *(f"- {text}" for text in sources)]
+    machines = sorted({name for result in results for name in result.processors})
+    notes = [f"- {text}" for text in (*comparison.unlike, *sources(comparison))]
+    notes += [f"- outrider: plans of this table on {name}" for name in machines]
     return (
         "".join(f"| {line} |\n" for line in rows)
         + "\n"
@@ -73,15 +79,27 @@ def markdown(comparison: Comparison, results: Sequence[Result]) -> str:
     )
 
 
+def sources(comparison: Comparison) -> list[str]:
+    """Return a sentence for each planner and source: where its figures are from, and its processor."""
+    return list(
+        dict.fromkeys(
+            f"{one.planner}: {one.source}{f'; plans on {one.processor}' if one.processor else ''}"
+            f"{f'; {one.note}' if one.note else ''}"
+            for one in comparison.published
+        )
+    )
+
+
 def lines(comparison: Comparison, result: Result) -> Iterator[tuple[str, ...]]:
     """Yield the published lines of a row, then ours."""
     for one in comparison.published:
         if one.row == result.row:
             yield _published(one)
-    bar = {None: "", True: "reached", False: "missed"}[result.reaches_bar]
+    bars = {row.label: row.bar for row in comparison.rows}
     yield (
         result.row,
         f"outrider ({result.vehicle}{_PHYSICS if result.motion == 'multirotor' else ''})",
+        f"{result.delay_ms:g} ms, {100.0 * result.loss:g} %",
         f"{result.succeeded} of {result.seeds}",
         _number(result.mean_s, 2),
         _number(result.last_s, 2),
@@ -91,9 +109,11 @@ def lines(comparison: Comparison, result: Result) -> Iterator[tuple[str, ...]]:
         _number(result.path_m, 2),
         _number(result.acceleration2, 0),
         _number(result.jerk2, 0),
+        _number(result.most_jerk, 1),
         _number(result.stops, 2),
+        str(result.violations),
         f"{_number(result.plan_ms_p50, 2)} / {_number(result.plan_ms_p99, 2)}",
-        bar,
+        _bar(bars.get(result.row), result.reaches_bar),
     )
 
 
@@ -101,6 +121,7 @@ def _published(one: Published) -> tuple[str, ...]:
     return (
         one.row,
         one.planner,
+        "",
         _NOTHING if one.success is None else f"{100.0 * one.success:g} %",
         _number(one.mean_s, 2),
         _number(one.last_s, 2),
@@ -110,10 +131,22 @@ def _published(one: Published) -> tuple[str, ...]:
         _number(one.path_m, 2),
         _number(one.acceleration2, 0),
         _number(one.jerk2, 0),
+        _NOTHING,
         _number(one.stops, 2),
+        "",
         _number(one.plan_ms, 1),
         "",
     )
+
+
+def _bar(bar: Bar | None, reached: bool | None) -> str:
+    """Return the limits of a bar, and whether the row reaches them."""
+    if bar is None or reached is None:
+        return ""
+    limits = (("mean", bar.mean_s), ("all", bar.last_s), ("plan", bar.plan_ms))
+    words = [f"{name} {most:g}" for name, most in limits if most is not None]
+    words.append(f"success {100.0 * bar.success:g} %")
+    return f"{', '.join(words)}: {'reached' if reached else 'missed'}"
 
 
 def _number(value: float | None, decimals: int) -> str:

@@ -17,6 +17,7 @@ from outrider.sweep.cells import scenario_of, task
 from outrider.sweep.comparison import Flown, flown
 from outrider.sweep.execution import header
 from outrider.sweep.runs import run_of
+from outrider.sweep.workers import Machines
 
 SEED = 1
 PAGE = "README.md"
@@ -43,7 +44,7 @@ def gallery(
     _check(there)
     # The header covers all scenarios, so that one journal can hold a few first and the rest later.
     whole = header("gallery", cells_of(showings(scenarios())))
-    entries = flown(whole, found, (SEED,), folder, run, jobs)
+    entries = flown(whole, found, (SEED,), folder, run, Machines(jobs))
     if entries is None:
         return INTERRUPTED
     by_cell = dict(zip(shown, (cell.key for cell in found), strict=True))

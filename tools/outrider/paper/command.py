@@ -19,6 +19,7 @@ from outrider.sweep.cells import Cell
 from outrider.sweep.comparison import Flown, flown
 from outrider.sweep.execution import header
 from outrider.sweep.runs import run_of
+from outrider.sweep.workers import Machines
 
 
 def paper(
@@ -41,7 +42,7 @@ def paper(
     name = "paper" if response == "exact" else f"paper-{response}"
     folder = places.prepare(out, name)
     numbers = range(TRACED, TRACED + seeds)
-    entries = flown(header(name, found), found, numbers, folder, run, jobs)
+    entries = flown(header(name, found), found, numbers, folder, run, Machines(jobs))
     if entries is None:
         return INTERRUPTED
     results = [

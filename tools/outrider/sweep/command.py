@@ -7,28 +7,26 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from outrider.errors import InputError
 from outrider.interruption import INTERRUPTED
-from outrider.processes.cores import cores
 from outrider.resources import find
 from outrider.runs import whole_file
 from outrider.sweep import directory as places
 from outrider.sweep import page, picture, regressions, tables
 from outrider.sweep.cells import Cell, cells, task, waits_for_others
-from outrider.sweep.execution import WALL_LIMIT_S, Workers, has_ended, header, work
+from outrider.sweep.execution import WALL_LIMIT_S, has_ended, header, work
 from outrider.sweep.flying import RUN
 from outrider.sweep.grid import Sweep
 from outrider.sweep.journal import Journal, opened
-from outrider.sweep.pool import Pool
 from outrider.sweep.progress import ResultCounter, duration, watching
 from outrider.sweep.report import CellReport, cell_report, document, exit_status
 from outrider.sweep.runs import Run, run_of
 from outrider.sweep.table import show
 from outrider.sweep.tasks import Task
+from outrider.sweep.workers import Machines
 from outrider.yaml_files.yaml_file import load
 
 
@@ -57,11 +55,7 @@ def sweep(
     if runs is not None:
         spec = spec.model_copy(update={"runs": runs})
     found = cells(spec, str(path))
-    if jobs is not None and scheduler is not None:
-        raise InputError(
-            "--jobs does not go with --scheduler; allowed: one of them: a Dask worker flies as many runs at "
-            "a time as it has threads (dask worker --nthreads)"
-        )
+    machines = Machines(jobs, scheduler, wall_limit_s)
     if failures is not None:
         regressions.prepare(failures)
     folder = places.prepare(out, spec.name)
@@ -77,7 +71,7 @@ def sweep(
             open_.callback(_name_losses, watch, labels)
             stopped = None
             if waiting:
-                workers = open_.enter_context(_workers(run, jobs, wall_limit_s, scheduler))
+                workers = open_.enter_context(machines.workers(run))
                 stopped = work(journal, waiting, watch, workers)
         if stopped is not None:
             left = sum(not has_ended(journal, one) for one in tasks)
@@ -94,16 +88,6 @@ def sweep(
             files = regressions.write(failures, spec.name, found, runs_of)
             sys.stderr.write(f"{len(files)} runs that failed are scenarios in {failures}\n")
         return status
-
-
-def _workers(
-    run: str, jobs: int | None, wall_limit_s: float, scheduler: str | None
-) -> AbstractContextManager[Workers]:
-    if scheduler is None:
-        return Pool(run, jobs or cores(), wall_limit_s)
-    from outrider.sweep.cluster import Cluster
-
-    return Cluster(scheduler, run, wall_limit_s)
 
 
 def _again(

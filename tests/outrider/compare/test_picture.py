@@ -1,0 +1,49 @@
+"""Picture of a comparison: a panel for each row with the paths and the outlines of the obstacles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+
+from companion.config.obstacles import Box, Post, Wall
+from outrider.compare.picture import draw
+
+WALL = Wall(kind="wall", ends=((-2.0, 1.0), (2.0, 1.0)), thickness=0.2, height=3.0)
+POST = Post(kind="post", at=(1.0, -1.0), radius=0.4, height=5.0)
+BOX = Box(kind="box", at=(0.0, -3.0, 1.0), size=(2.0, 1.0, 2.0), yaw_deg=90.0)
+
+
+def test_paths_and_obstacles_are_where_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Figure] = []
+    save = Figure.savefig
+
+    def keep(figure: Figure, *arguments: Any, **options: Any) -> None:
+        drawn.append(figure)
+        save(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", keep)
+    trace = np.array([[[0, 0, 1], [5, 0, 1]], [[1, 2, 1], [4, 2, 1]], [[2, 4, 1], [3, 4, 1]]], dtype=float)
+    path = tmp_path / "compare.png"
+    draw(
+        "two rows", {"open": trace.tolist(), "blocked": trace.tolist()}, path, {"blocked": (WALL, POST, BOX)}
+    )
+    assert path.read_bytes().startswith(b"\x89PNG")
+    (figure,) = drawn
+    free, blocked = figure.axes
+    assert (free.get_title(), blocked.get_title()) == ("open", "blocked")
+    for axes in (free, blocked):
+        first, *_ = axes.get_lines()
+        np.testing.assert_array_equal(first.get_xydata(), trace[:, 0, :2])
+    assert not free.patches
+    wall, post, box = blocked.patches
+    assert isinstance(post, Circle)
+    assert (post.center, post.radius) == ((1.0, -1.0), 0.4)
+    for patch, low, high in ((wall, (-2.0, 0.9), (2.0, 1.1)), (box, (-0.5, -4.0), (0.5, -2.0))):
+        assert isinstance(patch, Rectangle)
+        corners = patch.get_corners()
+        np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], [low, high], atol=1e-9)
