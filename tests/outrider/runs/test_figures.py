@@ -59,7 +59,7 @@ def covering(figure: Figure) -> list[str]:
 
 
 @pytest.fixture
-def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Outcome], Figure]:
+def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Figure]:
     """Draws a flight, and gives the figure."""
     found: list[Figure] = []
     save = Figure.savefig
@@ -68,8 +68,8 @@ def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Outcome]
         found.append(figure)
         save(figure, *arguments, **more)
 
-    def call(flight: Outcome) -> Figure:
-        said = {"avoidance": "field", "method": "tangential", "converged": None}
+    def call(flight: Outcome, motion: str = "multirotor") -> Figure:
+        said = {"avoidance": "field", "method": "tangential", "converged": None, "motion": motion}
         said |= {"min_separation_m": 4.0, "d_min_violations": 0}
         draw(flight, said, tmp_path / "flight.png")
         return found[-1]
@@ -78,7 +78,7 @@ def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Outcome]
     return call
 
 
-def test_boxes_and_walls_are_drawn_where_they_stand(drawn: Callable[[Outcome], Figure]) -> None:
+def test_boxes_and_walls_are_drawn_where_they_stand(drawn: Callable[..., Figure]) -> None:
     box = {"kind": "box", "at": [4.0, 1.0, 2.0], "size": [2.0, 1.0, 4.0], "yaw_deg": 90.0}
     wall = {"kind": "wall", "ends": [[-3.0, -4.0], [0.0, 0.0]], "thickness": 0.5}
     post = {"kind": "post", "at": [0.0, 8.0], "radius": 0.5}
@@ -92,8 +92,14 @@ def test_boxes_and_walls_are_drawn_where_they_stand(drawn: Callable[[Outcome], F
     assert (circle.center, circle.radius) == ((0.0, 8.0), 0.5)
 
 
+@pytest.mark.parametrize("motion", ["multirotor", "point"])
+def test_a_flight_of_points_is_marked_as_such(motion: str, drawn: Callable[..., Figure]) -> None:
+    title = drawn(flown(1), motion).get_suptitle()
+    assert ("points, no physics" in title) is (motion == "point")
+
+
 def test_a_world_that_is_larger_than_the_flight_does_not_make_it_small(
-    drawn: Callable[[Outcome], Figure],
+    drawn: Callable[..., Figure],
 ) -> None:
     """The flight is 40 m wide: what is 20 m beside it is in the picture, and what is far away is not."""
     near = {"kind": "box", "at": [35.0, 0.0, 2.0], "size": [2.0, 1.0, 4.0]}
@@ -105,7 +111,7 @@ def test_a_world_that_is_larger_than_the_flight_does_not_make_it_small(
 
 
 @pytest.mark.parametrize("vehicles", [1, 24, 25, pytest.param(200, marks=pytest.mark.slow)])
-def test_every_path_is_drawn_and_few_are_named(vehicles: int, drawn: Callable[[Outcome], Figure]) -> None:
+def test_every_path_is_drawn_and_few_are_named(vehicles: int, drawn: Callable[..., Figure]) -> None:
     figure = drawn(flown(vehicles))
     paths = figure.axes[0]
     ways = [line for line in paths.lines if len(line.get_xdata()) == 60 and line.get_marker() == "None"]

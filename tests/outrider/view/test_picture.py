@@ -222,3 +222,10 @@ def test_a_shell_of_a_box_holds_what_is_near_it() -> None:
     volume = np.einsum("fi,fi->f", a, np.cross(b, c)).sum() / 6.0
     exact = x * y * z + 2 * d * (x * y + y * z + z * x) + pi * d**2 * (x + y + z) + 4 / 3 * pi * d**3
     assert volume == pytest.approx(exact, rel=2e-3)
+
+
+@pytest.mark.parametrize(("vehicle", "marked"), [("point", True), ("firefly", False)])
+def test_a_scene_of_points_is_marked_as_such(vehicle: str, marked: bool) -> None:
+    of = scenario("antipodal-8").model_copy(update={"vehicle": vehicle})
+    scene = staged(of, 1, airframe(of.vehicle), frozenset())
+    assert ("points, no physics" in scene.title) is marked

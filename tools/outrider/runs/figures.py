@@ -49,6 +49,8 @@ def _headline(flight: Outcome, summary: dict[str, Value]) -> str:
     certified = summary["avoidance"] == "certified"
     way = "certified" if certified else str(summary["method"])
     words = [flight.scenario.name, way, f"seed {flight.seed}"]
+    if summary["motion"] == "point":
+        words.append("points, no physics")
     if summary["converged"] is not None:
         seconds = summary["convergence_time_s"]
         words.append(f"converged in {seconds} s" if seconds is not None else "not converged")

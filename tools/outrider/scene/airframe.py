@@ -16,13 +16,14 @@ class Airframe(NamedTuple):
 
     ``hubs``: places of the n rotors forward and left of the centre, and ``disc``: radius of a rotor, both as
     shares of the span. ``spins``: +1 for a rotor that turns counter-clockwise seen from above, −1 for
-    clockwise.
+    clockwise. ``point``: whether the vehicle moves exactly as its set-points say, without physics.
     """
 
     span: float
     hubs: tuple[tuple[float, float], ...]
     spins: tuple[float, ...]
     disc: float
+    point: bool = False
 
 
 _TURNS = tuple(pi * (k + 0.5) / 3.0 for k in range(6))
@@ -38,6 +39,7 @@ def airframe_of(vehicle: VehicleConfig) -> Airframe:
         tuple((x / vehicle.span, -y / vehicle.span) for x, y, _ in (one.position for one in vehicle.rotors)),
         tuple(one.spin_sign for one in vehicle.rotors),
         max(0.5 - reach / vehicle.span, 0.05),
+        vehicle.motion == "point",
     )
 
 

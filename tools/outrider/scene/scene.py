@@ -83,7 +83,7 @@ def staged(scenario: Scenario, seed: int, airframe: Airframe, levers: frozenset[
     low, high = places.min(axis=0), places.max(axis=0)
     centre = 0.5 * (low + high)
     return Scene(
-        scenario.name,
+        f"{scenario.name} (points, no physics)" if airframe.point else scenario.name,
         tuple(scenario.systems),
         scenario.vehicles,
         airframe,
