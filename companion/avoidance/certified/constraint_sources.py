@@ -6,7 +6,7 @@ All are given on the plan's own knots.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
-from math import hypot, sqrt
+from math import dist, hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,8 @@ Vehicles that jostle for room rest for a shorter time, and the turn of the goal 
 """
 _NEAR = 2.0
 """Distance from a landed vehicle, in least distances from it, below which one rests because of it."""
+_OVER, _BEHIND_M = 0.5, 0.05
+"""Share of the least distance from it below which a plan ends over it, and the least distance (m) ahead."""
 BESIDE_M = 0.05
 """Distance (m) of a way from what plans must keep clear of."""
 _AROUND_M, _MOST_BOXES = 20.0, 8
@@ -70,12 +72,20 @@ class ConstraintSources:
         self._sight = steps * 1e-6 * own.dt_us * fastest(config.limits) + widest + _SIGHT_MARGIN_M
 
     def around(
-        self, now: int, epoch: int, own: Array, agreements: Agreements, world: World, view: View
+        self,
+        now: int,
+        epoch: int,
+        own: Array,
+        goal: Array,
+        agreements: Agreements,
+        world: World,
+        view: View,
     ) -> tuple[Others, Array]:
         """Return the constraints of the plan that begins one epoch after ``epoch`` (µs), and the field.
 
         They are as known at ``now`` (µs). The field f (n, 3), m/s², acts in the plan's cost only.
-        ``own`` (n, 3, 3), m: the committed control points from the next epoch on.
+        ``own`` (n, 3, 3), m: the committed control points from the next epoch on. ``goal`` (3,), m: where the
+        plan aims.
         """
         begins = epoch + self._config.certified.epoch_us
         left = agreements.left
@@ -100,7 +110,7 @@ class ConstraintSources:
         unshared: list[tuple[Array, Array | float]] = [
             *(self._final_constraint(own, last, begins) for last in lasts),
             *self._fixed_constraints(own),
-            *(self._landed_constraint(own, last.controls[-1, 2], self.from_last(last)) for last in lasts),
+            *(self._departed_constraint(own, goal, last) for last in lasts),
             *(self._landed_constraint(own, place, self.between) for place in beside_plans),
             *noncooperative,
             *(self._sensed_constraints(sensed) if sensed.ids else ()),
@@ -230,6 +240,21 @@ class ConstraintSources:
         plan = last.later(begins, self._steps)
         centres = levelled(plan, own) if last.plan.column else plan
         return centres, self.from_last(last)
+
+    def _departed_constraint(self, own: Array, goal: Array, last: StoredPlan) -> tuple[Array, float]:
+        """Return the constraint at the place where the ``last`` plan of a vehicle that said farewell rests.
+
+        A vehicle whose own plan ends nearly over that place, because the companion of the other one ended
+        there, leaves towards ``goal`` (3,), m. The direction away from the place would be one by chance, and
+        may lead into a gap between obstacles that is too narrow.
+        """
+        rest, place, least = own[-1, 2], last.controls[-1, 2], self.from_last(last)
+        off, ahead = dist(rest[:2], place[:2]), dist(rest[:2], goal[:2])
+        if last.plan.column or off >= _OVER * least or ahead < _BEHIND_M:
+            return self._landed_constraint(own, place, least)
+        behind = own.copy()
+        behind[..., :2] -= max(off, _BEHIND_M) / ahead * (goal[:2] - rest[:2])
+        return behind, least
 
     def _landed_constraint(self, own: Array, place: Array, least: float) -> tuple[Array, float]:
         """Return the constraint at the ``place`` (3,), m, of a vehicle that lands or has landed.

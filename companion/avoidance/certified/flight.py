@@ -361,11 +361,11 @@ class CertifiedFlight:
         start = commitment.start()
         own = commitment.own()
         epoch = commitment.epoch(now)
-        others, field = self._sources.around(now, epoch, own, self.agreements, world, view)
         destination = self._places.destination(now, epoch, own[-1, 2], aim, self.agreements)
         given = aim.given and destination is aim.destination
         moving = aim.path is not None
         subgoal, goal = self._goals.chosen(now, epoch, start, own, destination, given=given, moving=moving)
+        others, field = self._sources.around(now, epoch, own, goal, self.agreements, world, view)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
         return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
 

@@ -85,7 +85,13 @@ class Here:
         own = stored(plan(number, x=self.x)).later(epoch(number + 1), STEPS)
         now = NOW + number * LENGTH
         others, field = self._sources.around(
-            now, epoch(number), own, self.agreements, self.world, View(None, None, None, None)
+            now,
+            epoch(number),
+            own,
+            own[-1, 2],
+            self.agreements,
+            self.world,
+            View(None, None, None, None),
         )
         return Constraints(len(others.own), bool(field.any()), float(others.distance.max(initial=0.0)))
 
