@@ -39,8 +39,10 @@ Vehicles that jostle for room rest for a shorter time, and the turn of the goal 
 """
 _NEAR = 2.0
 """Distance from a landed vehicle, in least distances from it, below which one rests because of it."""
-_OVER, _BEHIND_M = 0.5, 0.05
-"""Share of the least distance from it below which a plan ends over it, and the least distance (m) ahead."""
+_OVER = 0.5
+"""Share of the least distance from a departed vehicle below which a plan that ends higher ends over it."""
+_TOWARDS_M = 0.05
+"""Distance (m) of the goal from the end of the plan below which it gives no direction."""
 BESIDE_M = 0.05
 """Distance (m) of a way from what plans must keep clear of."""
 _AROUND_M, _MOST_BOXES = 20.0, 8
@@ -244,16 +246,18 @@ class ConstraintSources:
     def _departed_constraint(self, own: Array, goal: Array, last: StoredPlan) -> tuple[Array, float]:
         """Return the constraint at the place where the ``last`` plan of a vehicle that said farewell rests.
 
-        A vehicle whose own plan ends nearly over that place, because the companion of the other one ended
-        there, leaves towards ``goal`` (3,), m. The direction away from the place would be one by chance, and
-        may lead into a gap between obstacles that is too narrow.
+        A vehicle whose own plan ends over that place, because the companion of the other one ended below it,
+        leaves towards ``goal`` (3,), m. The direction away from the place would be one by chance, and may
+        lead into a gap between obstacles that is too narrow. Its height is kept by ``_final_constraint``.
         """
         rest, place, least = own[-1, 2], last.controls[-1, 2], self.from_last(last)
         off, ahead = dist(rest[:2], place[:2]), dist(rest[:2], goal[:2])
-        if last.plan.column or off >= _OVER * least or ahead < _BEHIND_M:
+        over = off < _OVER * least and rest[2] > place[2] and not self._config.planar
+        if last.plan.column or not over or ahead < _TOWARDS_M:
             return self._landed_constraint(own, place, least)
+        # Only the direction counts: any point so near behind the plan is nearer than ``least``.
         behind = own.copy()
-        behind[..., :2] -= max(off, _BEHIND_M) / ahead * (goal[:2] - rest[:2])
+        behind[..., :2] -= _TOWARDS_M / ahead * (goal[:2] - rest[:2])
         return behind, least
 
     def _landed_constraint(self, own: Array, place: Array, least: float) -> tuple[Array, float]:
