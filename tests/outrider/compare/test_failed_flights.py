@@ -10,16 +10,18 @@ import pytest
 from outrider.compare.cells import cells_of
 from outrider.compare.command import compare
 from outrider.compare.comparison import Comparison
+from outrider.compare.failed_flights import write
 from outrider.compare.scene import Scene, scenario_of
 from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
+from outrider.sweep.cells import Cell
 from outrider.sweep.tasks import Task
 from outrider.yaml_files.yaml_file import load
 from tests.outrider.compare.test_compare import flight
 
 RUN = f"{__name__}:fly"
 FAULTS = {
-    2: ({"obstacle_m": 0.1}, "a vehicle and an obstacle came to 0.1 m, where 0.15 m is a collision"),
+    2: ({"obstacle_m": 0.1}, "a vehicle and an obstacle were 0.1 m apart; less than 0.15 m is a collision"),
     3: ({"arrived": 1, "mean_s": None, "last_s": None}, "1 of 2 arrived"),
     4: ({"d_min_violations": 3}, "3 violations of d_min"),
 }
@@ -49,6 +51,24 @@ def test_failed_flights_leave_their_scenarios(tmp_path: Path, capsys: pytest.Cap
         assert load(file, Scenario) == scenario_of(Scene.model_validate_json(cell.document), seed)
 
 
-def test_flights_without_a_fault_leave_no_folder(tmp_path: Path) -> None:
+def test_flights_without_a_fault_leave_no_files(tmp_path: Path) -> None:
+    """And those of an earlier command, with more seeds, are not left beside its table."""
     assert compare("maze-sparse", 1, 1, tmp_path, as_json=True, run=RUN) == 0
     assert not (tmp_path / "failed").exists()
+    assert compare("maze-sparse", 3, 1, tmp_path, as_json=True, run=RUN) == 1
+    assert len(list((tmp_path / "failed").iterdir())) == 2
+    assert compare("maze-sparse", 1, 1, tmp_path, as_json=True, run=RUN) == 0
+    assert not list((tmp_path / "failed").iterdir())
+
+
+def test_a_flight_that_cannot_be_drawn_is_named_without_a_file(tmp_path: Path) -> None:
+    cell = Cell("a row", "001-x", "k", '{"scenario": {}}', "{}", is_scene=False)
+    assert write(tmp_path, [(cell, 2, ["no world"])]) == []
+
+
+def test_unprintable_characters_of_an_error_leave_a_file_that_loads(tmp_path: Path) -> None:
+    path = find("comparisons", "maze-sparse")
+    comparison = load(path, Comparison)
+    (cell,) = cells_of(comparison, path, comparison.rows, None)
+    (file,) = write(tmp_path, [(cell, 2, ["red \x1b[31m\x00 text"])])
+    load(file, Scenario)

@@ -28,6 +28,8 @@ from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 DOCUMENT, MARKDOWN, PICTURE = "compare.json", "compare.md", "compare.png"
+Failed = tuple[Cell, int, list[str]]
+"""A flight that failed: its cell, its seed and its faults."""
 
 
 def compare(
@@ -87,7 +89,13 @@ def compare(
     results = [
         _result(comparison, row, cell, entries, numbers) for row, cell in zip(shown, found, strict=True)
     ]
-    document = _document(comparison, results)
+    failed = [
+        (cell, seed, wrong)
+        for cell in found
+        for seed in numbers
+        if (wrong := faults(entries[cell.key, seed], comparison.measure))
+    ]
+    document = _document(comparison, results, failed)
     whole_file.write(folder / DOCUMENT, json.dumps(document, indent=2) + "\n")
     whole_file.write(folder / MARKDOWN, table.markdown(comparison, results))
     _draw(comparison, found, entries, folder)
@@ -96,12 +104,6 @@ def compare(
     else:
         table.show(comparison, results)
     sys.stderr.write(f"table, Markdown and picture: {folder}\n")
-    failed = [
-        (cell, seed, wrong)
-        for cell in found
-        for seed in numbers
-        if (wrong := faults(entries[cell.key, seed], comparison.measure))
-    ]
     _report(failed, folder)
     return 1 if failed else 0
 
@@ -129,8 +131,8 @@ def _result(comparison: Comparison, row: Row, cell: Cell, entries: Flown, number
     return result_of(comparison, row, scene.scenario["links"], (vehicle.name, vehicle.motion), of_row)
 
 
-def _document(comparison: Comparison, results: Sequence[Result]) -> dict[str, Any]:
-    """Return the results, and the published figures of their rows, as values of JSON."""
+def _document(comparison: Comparison, results: Sequence[Result], failed: Sequence[Failed]) -> dict[str, Any]:
+    """Return the results, the published figures of their rows, and what failed, as values of JSON."""
     labels = {result.row for result in results}
     return {
         "comparison": comparison.name,
@@ -140,11 +142,12 @@ def _document(comparison: Comparison, results: Sequence[Result]) -> dict[str, An
         "rows": [result.document() for result in results],
         "published": [one.model_dump() for one in comparison.published if one.row in labels],
         "differences": list(comparison.unlike),
+        "failed": [{"row": cell.label, "seed": seed, "faults": wrong} for cell, seed, wrong in failed],
     }
 
 
-def _report(failed: Sequence[tuple[Cell, int, list[str]]], folder: Path) -> None:
-    """Name the flights that failed, each a cell, a seed and its faults, and write their scenarios."""
+def _report(failed: Sequence[Failed], folder: Path) -> None:
+    """Name the flights that failed, and write their scenarios."""
     for cell, seed, wrong in failed:
         sys.stderr.write(f"failed: {cell.label}, seed {seed}: {'; '.join(wrong)}\n")
     if files := failed_flights.write(folder, failed):
@@ -160,5 +163,7 @@ def _draw(comparison: Comparison, found: list[Cell], entries: Flown, folder: Pat
             scene = Scene.model_validate_json(cell.document)
             obstacles[cell.label] = scenario_of(scene, TRACED).obstacles
     if traces:
-        title = f"{comparison.name}, seed {TRACED}: paths from above"
+        points = any(VehicleConfig.model_validate_json(one.vehicle).motion == "point" for one in found)
+        kind = ", points without physics" if points else ""
+        title = f"{comparison.name}, seed {TRACED}{kind}: paths from above"
         picture.draw(title, traces, folder / PICTURE, obstacles)

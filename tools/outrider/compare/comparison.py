@@ -56,7 +56,7 @@ class Missions(Part):
 
 
 class Bar(Part):
-    """What a row shall reach, without a violation of its own distances in any case."""
+    """What a row shall reach, without a violation of its own d_min in any case."""
 
     mean_s: Figure | None = Field(None, description="s, mean time of arrival at most")
     last_s: Figure | None = Field(None, description="s, last arrival at most, mean over the flights")
@@ -83,7 +83,8 @@ class Published(Part):
     row: Text = Field(description="label of a row of this file")
     success: Share | None = Field(None, description="share of the flights without a collision that arrive")
     mean_s: Figure | None = Field(
-        None, description="s, mean time, of a vehicle or of which it is not said whose it is"
+        None,
+        description="s, mean time of arrival over vehicles, or a mean whose source does not say over what",
     )
     last_s: Figure | None = Field(None, description="s, time until all have arrived, mean over the flights")
     worst_s: Figure | None = Field(None, description="s, longest time")

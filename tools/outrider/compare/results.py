@@ -132,7 +132,7 @@ def _collisions(flight: Mapping[str, Any], measure: Measure) -> list[str]:
         ("a vehicle and an obstacle", flight["obstacle_m"], measure.obstacle),
     )
     return [
-        f"{what} came to {apart:g} m, where {least:g} m is a collision ({measure.kind})"
+        f"{what} were {apart:g} m apart; less than {least:g} m is a collision"
         for what, apart, least in pairs
         if apart is not None and least is not None and apart < least
     ]

@@ -56,9 +56,9 @@ def caption(comparison: Comparison) -> str:
         limits += f", none is nearer to an obstacle than {measure.obstacle:g} m"
     return (
         f"success: all arrive {limits} ({measure.kind}); mean over vehicles; all: last arrival, mean over"
-        " flights; worst: last arrival of all flights; j: largest jerk on an axis; own d_min: violations of"
-        " the distance of our plans; plan: CPU time, p50 / p99, theirs as published; delay and loss: of"
-        f" messages between vehicles; {_NOTHING}: not published, or does not exist"
+        " flights; worst: last arrival of all flights; j: largest jerk on an axis; own d_min: times that two"
+        " vehicles came nearer than our scenario's; plan: CPU time, p50 / p99, theirs as published; delay and"
+        f" loss: of messages between vehicles; {_NOTHING}: not published, or does not exist"
     )
 
 
