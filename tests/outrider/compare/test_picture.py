@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from companion.config.obstacles import Box, Post, Wall
-from outrider.compare.picture import draw
+from outrider.compare.picture import Paths, draw
 
 WALL = Wall(kind="wall", ends=((-2.0, 1.0), (2.0, 1.0)), thickness=0.2, height=3.0)
 POST = Post(kind="post", at=(1.0, -1.0), radius=0.4, height=5.0)
@@ -29,18 +29,20 @@ def test_paths_and_obstacles_are_where_they_were(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(Figure, "savefig", keep)
     trace = np.array([[[0, 0, 1], [5, 0, 1]], [[1, 2, 1], [4, 2, 1]], [[2, 4, 1], [3, 4, 1]]], dtype=float)
     path = tmp_path / "compare.png"
-    draw(
-        "two rows", {"open": trace.tolist(), "blocked": trace.tolist()}, path, {"blocked": (WALL, POST, BOX)}
-    )
+    ball = np.array([[[6.0, 0.0, 1.0]], [[6.0, 1.0, 1.0]], [[6.0, 2.0, 1.0]]])
+    blocked = Paths(trace, (WALL, POST, BOX), ball, [0.3])
+    draw("two rows", {"open": Paths(trace), "blocked": blocked}, path)
     assert path.read_bytes().startswith(b"\x89PNG")
     (figure,) = drawn
-    free, blocked = figure.axes
-    assert (free.get_title(), blocked.get_title()) == ("open", "blocked")
-    for axes in (free, blocked):
+    free, among = figure.axes
+    assert (free.get_title(), among.get_title()) == ("open", "blocked")
+    for axes, of in ((free, trace), (among, ball)):
         first, *_ = axes.get_lines()
-        np.testing.assert_array_equal(first.get_xydata(), trace[:, 0, :2])
+        np.testing.assert_array_equal(first.get_xydata(), of[:, 0, :2])
     assert not free.patches
-    wall, post, box = blocked.patches
+    wall, post, box, last = among.patches
+    assert isinstance(last, Circle)
+    assert (last.center, last.radius) == ((6.0, 2.0), 0.3)
     assert isinstance(post, Circle)
     assert (post.center, post.radius) == ((1.0, -1.0), 0.4)
     for patch, low, high in ((wall, (-2.0, 0.9), (2.0, 1.1)), (box, (-0.5, -4.0), (0.5, -2.0))):

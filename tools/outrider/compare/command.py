@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from outrider.compare import failed_flights, picture, table
 from outrider.compare.cells import cells_of
 from outrider.compare.comparison import Comparison, Row
@@ -155,15 +157,15 @@ def _report(failed: Sequence[Failed], folder: Path) -> None:
 
 
 def _draw(comparison: Comparison, found: list[Cell], entries: Flown, folder: Path) -> None:
-    traces, obstacles = {}, {}
+    panels = {}
     for cell in found:
         summary = entries[cell.key, TRACED].summary
         if summary is not None and "trace" in summary:
-            traces[cell.label] = summary["trace"]
-            scene = Scene.model_validate_json(cell.document)
-            obstacles[cell.label] = scenario_of(scene, TRACED).obstacles
-    if traces:
+            scenario = scenario_of(Scene.model_validate_json(cell.document), TRACED)
+            moving = np.array(summary.get("moving", [])), [one.radius for one in scenario.moving]
+            panels[cell.label] = picture.Paths(np.array(summary["trace"]), scenario.obstacles, *moving)
+    if panels:
         points = any(VehicleConfig.model_validate_json(one.vehicle).motion == "point" for one in found)
         kind = ", points without physics" if points else ""
         title = f"{comparison.name}, seed {TRACED}{kind}: paths from above"
-        picture.draw(title, traces, folder / PICTURE, obstacles)
+        picture.draw(title, panels, folder / PICTURE)

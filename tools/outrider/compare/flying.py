@@ -46,7 +46,7 @@ def fly(task: Task) -> dict[str, Any]:
     found |= {"obstacle_m": round(float(obstacle), 4) if np.isfinite(obstacle) else None}
     found |= {"d_min_violations": outcome.truth.vehicles.count, "failure": outcome.failure}
     found |= {"processor": processor()}
-    return {**found, "trace": _trace(outcome)} if task.seed == TRACED else found
+    return {**found, **_traces(outcome)} if task.seed == TRACED else found
 
 
 def _planning(outcome: Outcome) -> dict[str, Any]:
@@ -65,8 +65,13 @@ def _planning(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _trace(outcome: Outcome) -> list[Any]:
-    """Return the positions (T, K, 3), m, every 0.1 s, in mm because they go into a journal."""
+def _traces(outcome: Outcome) -> dict[str, Any]:
+    """Return the ``trace`` of the vehicles (T, K, 3), m, and that of obstacles that are ``moving`` (T, M, 3).
+
+    They have positions every 0.1 s, in mm because they go into a journal.
+    """
     samples = outcome.truth.samples(outcome.clock_start or 0, outcome.clock_end)
-    rounded: list[Any] = np.round(samples.position[::_SAMPLES_PER_POINT], 3).tolist()
-    return rounded
+    arrays = {"trace": samples.position}
+    if outcome.scenario.moving:
+        arrays["moving"] = samples.moving
+    return {name: np.round(of[::_SAMPLES_PER_POINT], 3).tolist() for name, of in arrays.items()}

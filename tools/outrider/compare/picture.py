@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.config.obstacles import Obstacle, Post, Sphere, Wall
 from outrider.palette import OBSTACLE, coloured, hex_of
@@ -15,34 +16,45 @@ from outrider.palette import OBSTACLE, coloured, hex_of
 if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
+Array = NDArray[np.float64]
 _COLUMNS = 4
 
 
-@coloured
-def draw(
-    title: str,
-    traces: Mapping[str, list[Any]],
-    path: Path,
-    obstacles: Mapping[str, Sequence[Obstacle]] | None = None,
-) -> None:
-    """Write the PNG of ``traces``, positions (T, K, 3), m, by the label of the row, to ``path``.
+class Paths(NamedTuple):
+    """What one panel shows: positions of K vehicles (T, K, 3), m, and below them the obstacles.
 
-    ``obstacles``, by the same labels, are drawn below the paths.
+    Those that move have positions ``moving`` (T, M, 3), m, and ``radii`` (M,), m; a circle is drawn where
+    each was at last.
     """
+
+    vehicles: Array
+    fixed: Sequence[Obstacle] = ()
+    moving: Array = np.empty((0, 0, 3))
+    radii: Sequence[float] = ()
+
+
+@coloured
+def draw(title: str, panels: Mapping[str, Paths], path: Path) -> None:
+    """Write the PNG of ``panels``, by the labels of their rows, to ``path``."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.patches import Circle
 
-    columns = min(_COLUMNS, len(traces))
-    rows = ceil(len(traces) / columns)
+    columns = min(_COLUMNS, len(panels))
+    rows = ceil(len(panels) / columns)
     figure = Figure(figsize=(4.0 * columns, 4.2 * rows), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for one in axes[len(traces) :]:
+    for one in axes[len(panels) :]:
         one.set_axis_off()
-    for one, (label, trace) in zip(axes, traces.items(), strict=False):
-        positions = np.array(trace)
-        for obstacle in (obstacles or {}).get(label, ()):
+    for one, (label, paths) in zip(axes, panels.items(), strict=False):
+        positions = paths.vehicles
+        for obstacle in paths.fixed:
             one.add_patch(_outline(obstacle))
+        for j, radius in enumerate(paths.radii):
+            way = paths.moving[:, j]
+            one.plot(way[:, 0], way[:, 1], lw=0.8, ls=":", color=OBSTACLE)
+            one.add_patch(Circle((way[-1, 0], way[-1, 1]), radius, color=OBSTACLE, lw=0.0))
         for k in range(positions.shape[1]):
             of = hex_of(k)
             one.plot(positions[:, k, 0], positions[:, k, 1], lw=1.0, color=of)
