@@ -92,8 +92,8 @@ def test_a_violation_of_the_own_distance_misses_every_bar() -> None:
     comparison = load(find("comparisons", "hdsm-circle"), Comparison)
     (row,) = comparison.rows
     for violations, reached in ((0, True), (1, False)):
-        flights = entries(flight(), flight(d_min_violations=violations, separation_m=0.7))
-        flights[0].summary["separation_m"] = 0.7
+        apart = {"separation_m": 0.7}
+        flights = entries(flight(**apart), flight(d_min_violations=violations, **apart))
         found = result_of(comparison, row, LINKS, ("point", "point"), flights)
         assert (found.succeeded, found.violations, found.reaches_bar) == (2, violations, reached)
         assert bool(faults(flights[1], comparison.measure)) is not reached

@@ -10,7 +10,7 @@ import pytest
 from outrider.compare.cells import cells_of
 from outrider.compare.command import compare
 from outrider.compare.comparison import Comparison
-from outrider.compare.failed_flights import write
+from outrider.compare.failed_flights import FailedFlight, write
 from outrider.compare.scene import Scene, scenario_of
 from outrider.resources import find
 from outrider.scenarios.scenario import Scenario
@@ -63,12 +63,12 @@ def test_flights_without_a_fault_leave_no_files(tmp_path: Path) -> None:
 
 def test_a_flight_that_cannot_be_drawn_is_named_without_a_file(tmp_path: Path) -> None:
     cell = Cell("a row", "001-x", "k", '{"scenario": {}}', "{}", is_scene=False)
-    assert write(tmp_path, [(cell, 2, ["no world"])]) == []
+    assert write(tmp_path, [FailedFlight(cell, 2, ["no world"])]) == []
 
 
 def test_unprintable_characters_of_an_error_leave_a_file_that_loads(tmp_path: Path) -> None:
     path = find("comparisons", "maze-sparse")
     comparison = load(path, Comparison)
     (cell,) = cells_of(comparison, path, comparison.rows, None)
-    (file,) = write(tmp_path, [(cell, 2, ["red \x1b[31m\x00 text"])])
+    (file,) = write(tmp_path, [FailedFlight(cell, 2, ["red \x1b[31m\x00 text"])])
     load(file, Scenario)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from companion.config.obstacles import Box, Post, Wall
 from outrider.compare.picture import Paths, draw
+from tests.outrider.saved_figures import saved_figures
 
 WALL = Wall(kind="wall", ends=((-2.0, 1.0), (2.0, 1.0)), thickness=0.2, height=3.0)
 POST = Post(kind="post", at=(1.0, -1.0), radius=0.4, height=5.0)
@@ -19,14 +18,7 @@ BOX = Box(kind="box", at=(0.0, -3.0, 1.0), size=(2.0, 1.0, 2.0), yaw_deg=90.0)
 
 
 def test_paths_and_obstacles_are_where_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[Figure] = []
-    save = Figure.savefig
-
-    def keep(figure: Figure, *arguments: Any, **options: Any) -> None:
-        drawn.append(figure)
-        save(figure, *arguments, **options)
-
-    monkeypatch.setattr(Figure, "savefig", keep)
+    drawn = saved_figures(monkeypatch)
     trace = np.array([[[0, 0, 1], [5, 0, 1]], [[1, 2, 1], [4, 2, 1]], [[2, 4, 1], [3, 4, 1]]], dtype=float)
     path = tmp_path / "compare.png"
     ball = np.array([[[6.0, 0.0, 1.0]], [[6.0, 1.0, 1.0]], [[6.0, 2.0, 1.0]]])

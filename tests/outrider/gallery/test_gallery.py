@@ -23,6 +23,7 @@ from outrider.resources import config_root
 from outrider.sweep.cells import scenario_of, task
 from outrider.sweep.runs import Ending, Run, run_of
 from outrider.sweep.tasks import Entry
+from tests.outrider.saved_figures import saved_figures
 
 
 @pytest.mark.slow
@@ -146,14 +147,7 @@ def scene(shift: float, *, apart: float, standoff: bool) -> dict[str, Any]:
 @pytest.fixture
 def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Figure]:
     """Draws panels, and gives the figure."""
-    kept: list[Figure] = []
-    save = Figure.savefig
-
-    def keep(figure: Figure, *arguments: Any, **more: Any) -> None:
-        kept.append(figure)
-        save(figure, *arguments, **more)
-
-    monkeypatch.setattr(Figure, "savefig", keep)
+    kept = saved_figures(monkeypatch)
 
     def call(*scenes: dict[str, Any] | None) -> Figure:
         run = run_of(Entry("key", 1, "done", None, {"converged": True, "convergence_time_s": 1.0}, 0.0))

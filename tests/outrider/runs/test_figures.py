@@ -16,6 +16,7 @@ from matplotlib.patches import Circle
 from outrider.runs.figures import draw
 from outrider.runs.ground_truth import Samples
 from outrider.runs.outcome import Outcome
+from tests.outrider.saved_figures import saved_figures
 from tests.outrider.shipped import scenario
 
 
@@ -61,12 +62,7 @@ def covering(figure: Figure) -> list[str]:
 @pytest.fixture
 def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Figure]:
     """Draws a flight, and gives the figure."""
-    found: list[Figure] = []
-    save = Figure.savefig
-
-    def kept(figure: Figure, *arguments: Any, **more: Any) -> None:
-        found.append(figure)
-        save(figure, *arguments, **more)
+    found = saved_figures(monkeypatch)
 
     def call(flight: Outcome, motion: str = "multirotor") -> Figure:
         said = {"avoidance": "field", "method": "tangential", "converged": None, "motion": motion}
@@ -74,7 +70,6 @@ def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Figu
         draw(flight, said, tmp_path / "flight.png")
         return found[-1]
 
-    monkeypatch.setattr(Figure, "savefig", kept)
     return call
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from outrider.compare import failed_flights, picture, table
 from outrider.compare.cells import cells_of
 from outrider.compare.comparison import Comparison, Row
+from outrider.compare.failed_flights import FailedFlight
 from outrider.compare.flying import RUN, TRACED
 from outrider.compare.physics import in_physics
 from outrider.compare.results import Result, faults, result_of
@@ -30,8 +31,6 @@ from outrider.yaml_files.yaml_file import load
 from sitl.vehicle.config import VehicleConfig
 
 DOCUMENT, MARKDOWN, PICTURE = "compare.json", "compare.md", "compare.png"
-Failed = tuple[Cell, int, list[str]]
-"""A flight that failed: its cell, its seed and its faults."""
 
 
 def compare(
@@ -92,7 +91,7 @@ def compare(
         _result(comparison, row, cell, entries, numbers) for row, cell in zip(shown, found, strict=True)
     ]
     failed = [
-        (cell, seed, wrong)
+        FailedFlight(cell, seed, wrong)
         for cell in found
         for seed in numbers
         if (wrong := faults(entries[cell.key, seed], comparison.measure))
@@ -100,7 +99,8 @@ def compare(
     document = _document(comparison, results, failed)
     whole_file.write(folder / DOCUMENT, json.dumps(document, indent=2) + "\n")
     whole_file.write(folder / MARKDOWN, table.markdown(comparison, results))
-    _draw(comparison, found, entries, folder)
+    points = any(result.motion == "point" for result in results)
+    _draw(comparison, found, entries, folder, points=points)
     if as_json:
         sys.stdout.write(json.dumps(document) + "\n")
     else:
@@ -133,7 +133,9 @@ def _result(comparison: Comparison, row: Row, cell: Cell, entries: Flown, number
     return result_of(comparison, row, scene.scenario["links"], (vehicle.name, vehicle.motion), of_row)
 
 
-def _document(comparison: Comparison, results: Sequence[Result], failed: Sequence[Failed]) -> dict[str, Any]:
+def _document(
+    comparison: Comparison, results: Sequence[Result], failed: Sequence[FailedFlight]
+) -> dict[str, Any]:
     """Return the results, the published figures of their rows, and what failed, as values of JSON."""
     labels = {result.row for result in results}
     return {
@@ -144,19 +146,19 @@ def _document(comparison: Comparison, results: Sequence[Result], failed: Sequenc
         "rows": [result.document() for result in results],
         "published": [one.model_dump() for one in comparison.published if one.row in labels],
         "differences": list(comparison.unlike),
-        "failed": [{"row": cell.label, "seed": seed, "faults": wrong} for cell, seed, wrong in failed],
+        "failed": [{"row": one.cell.label, "seed": one.seed, "faults": one.faults} for one in failed],
     }
 
 
-def _report(failed: Sequence[Failed], folder: Path) -> None:
+def _report(failed: Sequence[FailedFlight], folder: Path) -> None:
     """Name the flights that failed, and write their scenarios."""
-    for cell, seed, wrong in failed:
-        sys.stderr.write(f"failed: {cell.label}, seed {seed}: {'; '.join(wrong)}\n")
+    for one in failed:
+        sys.stderr.write(f"failed: {one.text}\n")
     if files := failed_flights.write(folder, failed):
         sys.stderr.write(f"scenarios of {len(files)} failed flights: {folder / failed_flights.FOLDER}\n")
 
 
-def _draw(comparison: Comparison, found: list[Cell], entries: Flown, folder: Path) -> None:
+def _draw(comparison: Comparison, found: list[Cell], entries: Flown, folder: Path, *, points: bool) -> None:
     panels = {}
     for cell in found:
         summary = entries[cell.key, TRACED].summary
@@ -165,7 +167,6 @@ def _draw(comparison: Comparison, found: list[Cell], entries: Flown, folder: Pat
             moving = np.array(summary.get("moving", [])), [one.radius for one in scenario.moving]
             panels[cell.label] = picture.Paths(np.array(summary["trace"]), scenario.obstacles, *moving)
     if panels:
-        points = any(VehicleConfig.model_validate_json(one.vehicle).motion == "point" for one in found)
         kind = ", points without physics" if points else ""
         title = f"{comparison.name}, seed {TRACED}{kind}: paths from above"
         picture.draw(title, panels, folder / PICTURE)

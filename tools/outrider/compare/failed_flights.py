@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
 from outrider.compare.scene import Scene, scenario_of
 from outrider.errors import InputError
 from outrider.runs import whole_file
-from outrider.sweep.cells import Cell, scenario_text
+from outrider.sweep.cells import Cell
+from outrider.sweep.regressions import file_text
 
 FOLDER = "failed"
 
 
-def write(folder: Path, failed: Iterable[tuple[Cell, int, list[str]]]) -> list[Path]:
-    """Write the scenario of each flight, a cell, a seed and its faults, to ``folder``/failed.
+class FailedFlight(NamedTuple):
+    """A flight of ``cell`` with ``seed`` and its ``faults``, a clause each."""
+
+    cell: Cell
+    seed: int
+    faults: list[str]
+
+    @property
+    def text(self) -> str:
+        """The flight and its faults."""
+        return f"{self.cell.label}, seed {self.seed}: {'; '.join(self.faults)}"
+
+
+def write(folder: Path, failed: Iterable[FailedFlight]) -> list[Path]:
+    """Write the scenario of each flight to ``folder``/failed.
 
     A file begins with the faults and the command that flies it. A flight whose scenario cannot be drawn has
     no file. Files that an earlier command left there are removed. Returns the files.
@@ -25,17 +39,13 @@ def write(folder: Path, failed: Iterable[tuple[Cell, int, list[str]]]) -> list[P
     files = []
     for old in (folder / FOLDER).glob("*-seed*.yaml"):
         old.unlink()
-    for cell, seed, faults in failed:
+    for one in failed:
         try:
-            scenario = scenario_of(Scene.model_validate_json(cell.document), seed)
+            scenario = scenario_of(Scene.model_validate_json(one.cell.document), one.seed)
         except (InputError, ValidationError):
             continue
-        path = folder / FOLDER / f"{cell.slug}-seed{seed}.yaml"
-        command = shlex.join(["outrider", "swarm", path.name, "--seed", str(seed)])
-        # Line breaks would end the YAML comment, and YAML has no unprintable characters.
-        words = f"{cell.label}, seed {seed}: {'; '.join(faults)}".split()
-        head = "".join(one for one in " ".join(words) if one.isprintable())
+        path = folder / FOLDER / f"{one.cell.slug}-seed{one.seed}.yaml"
         path.parent.mkdir(exist_ok=True)
-        whole_file.write(path, f"# {head}\n# {command}\n{scenario_text(scenario)}")
+        whole_file.write(path, file_text(path.name, one.text, one.seed, scenario))
         files.append(path)
     return files

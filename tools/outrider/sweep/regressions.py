@@ -9,10 +9,11 @@ from pathlib import Path
 
 from outrider.errors import InputError
 from outrider.runs import whole_file
+from outrider.scenarios.scenario import Scenario
 from outrider.sweep.cells import Cell, scenario_of, scenario_text, task
 from outrider.sweep.runs import Ending, Run
 
-_MARK = "# A run of a sweep that failed"
+_MARK = "A run of a sweep that failed"
 _KEY = 8
 
 
@@ -54,8 +55,13 @@ def _text(path: Path, sweep: str, cell: Cell, run: Run) -> str:
         words.append(f"least separation {run.separation:g} m")
     if run.what:
         words.append(run.what)
-    # Line breaks of an error or a label would end the YAML comment.
-    why, label = (" ".join(text.split()) for text in (", ".join(words), cell.label))
-    command = shlex.join(["outrider", "swarm", path.name, "--seed", str(run.seed)])
-    head = f"{_MARK}: sweep {sweep}, {label}, seed {run.seed}: {why}\n# {command}\n"
-    return head + scenario_text(scenario_of(task(cell, run.seed)))
+    what = f"{_MARK}: sweep {sweep}, {cell.label}, seed {run.seed}: {', '.join(words)}"
+    return file_text(path.name, what, run.seed, scenario_of(task(cell, run.seed)))
+
+
+def file_text(name: str, what: str, seed: int, scenario: Scenario) -> str:
+    """Return the text of a scenario file ``name``, which begins with ``what`` failed and how to fly it."""
+    # Line breaks of an error or a label would end the YAML comment, and YAML has no unprintable characters.
+    head = "".join(one for one in " ".join(what.split()) if one.isprintable())
+    command = shlex.join(["outrider", "swarm", name, "--seed", str(seed)])
+    return f"# {head}\n# {command}\n{scenario_text(scenario)}"
