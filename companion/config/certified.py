@@ -228,6 +228,13 @@ class CertifiedConfig(Settings):
     )
     noncooperative_speed: Positive = Field(1.0, description="m/s, of those that share no plan")
     noncooperative_acceleration: Positive = Field(1.0, description="m/s², of those that share no plan")
+    noncooperative_growth_us: int | None = Field(
+        None,
+        ge=0,
+        le=60_000_000,
+        description="µs of a plan in which those that share no plan may change their velocity; afterwards they"
+        " are assumed to keep it; null: all of the plan",
+    )
     omega_end: Positive = Field(30.0, description="weight of where the plan comes to rest")
     omega_place: Weight = Field(0.3, description="weight of where it is after each step before")
     omega_speed: Weight = Field(0.1, description="weight of its speeds")

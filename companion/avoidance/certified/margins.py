@@ -7,7 +7,7 @@ times the error of its clock.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -71,7 +71,13 @@ def _strays(config: CertifiedConfig, limits: LimitsConfig) -> float:
 
 
 def reachable(
-    position: Array, velocity: Array, age: float, seconds: Array, speed: float, acceleration: float
+    position: Array,
+    velocity: Array,
+    age: float,
+    seconds: Array,
+    speed: float,
+    acceleration: float,
+    growth: float = inf,
 ) -> tuple[Array, Array]:
     """Return balls that hold a non-cooperative vehicle: centres (n, 3, 3) and radii (n,), m.
 
@@ -79,13 +85,16 @@ def reachable(
     the control points of n segments, the radii those at the segments' ends. The vehicle was at ``position``
     (3,), m, with ``velocity`` (3,), m/s, ``age`` seconds before time 0 of ``seconds`` (n + 1,), the knots.
     Two balls hold it: one about its last position, one about the position at constant velocity; the smaller
-    one is returned.
+    one is returned. From the first knot at or after ``growth`` (s) on the vehicle is assumed to keep
+    ``velocity``: the ball keeps its radius and moves on.
     """
     later = age + seconds
     begin, end = later[:-1], later[1:]
-    stays = speed * end
-    goes_on = 0.5 * acceleration * end**2
+    until = later[min(int(np.searchsorted(seconds, growth)), len(end))]
+    bounded = np.minimum(end, until)
+    stays, goes_on = speed * bounded, 0.5 * acceleration * bounded**2
     flies = goes_on < stays
-    moved = np.stack([begin, 0.5 * (begin + end), end], axis=1) * flies[:, None]
+    times = np.stack([begin, 0.5 * (begin + end), end], axis=1)
+    moved = np.where(flies[:, None], times, np.maximum(times - until, 0.0))
     centres = position + moved[:, :, None] * velocity
     return centres, np.where(flies, goes_on, stays)

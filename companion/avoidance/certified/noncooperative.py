@@ -8,6 +8,7 @@ itself. The field does, as far as other plans leave room.
 from __future__ import annotations
 
 from collections.abc import Set
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -87,9 +88,12 @@ class NonCooperative:
 
         ``own`` (n, 3, 3), m, are the control points of the own plan.
         """
+        own_config = self._config.certified
+        growth = own_config.noncooperative_growth_us
         bounds = (
-            self._config.certified.noncooperative_speed,
-            self._config.certified.noncooperative_acceleration,
+            own_config.noncooperative_speed,
+            own_config.noncooperative_acceleration,
+            inf if growth is None else 1e-6 * growth,
         )
         found = []
         for one in seen:

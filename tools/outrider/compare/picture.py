@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _COLUMNS = 4
+_LETTERS = 42
+"""Letters of the title that are as wide as one panel."""
 
 
 class Paths(NamedTuple):
@@ -63,7 +66,7 @@ def draw(title: str, panels: Mapping[str, Paths], path: Path) -> None:
         one.set(title=label, xlabel="east, m", ylabel="north, m")
         one.set_aspect("equal", adjustable="datalim")
         one.grid(alpha=0.3)
-    figure.suptitle(title)
+    figure.suptitle(fill(title, _LETTERS * columns))
     figure.savefig(path, dpi=110)
 
 

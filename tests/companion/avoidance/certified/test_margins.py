@@ -54,6 +54,33 @@ def test_the_balls_hold_every_motion_within_the_bounds(
     assert (off <= radii[:, None] + 1e-9).all()
 
 
+@given(
+    seeds,
+    st.floats(0.0, 3.0),
+    st.sampled_from([0.3, 1.0, 5.0]),
+    st.sampled_from([0.1, 1.0, 4.0]),
+    st.floats(0.0, DT * STEPS),
+)
+def test_the_balls_hold_a_vehicle_that_keeps_its_velocity_after_the_growth(
+    seed: int, age: float, speed: float, acceleration: float, growth: float
+) -> None:
+    """Up to ``growth`` it moves anyhow within the bounds, from the next knot on with the received velocity."""
+    rng = np.random.default_rng(seed)
+    direction = rng.normal(size=3)
+    velocity = rng.uniform() ** 0.3 * speed * direction / np.linalg.norm(direction)
+    centres, radii = reachable(np.zeros(3), velocity, age, SECONDS, speed, acceleration, growth)
+    grown = int(np.searchsorted(SECONDS, growth))
+    flown = any_motion(rng, velocity, age, speed, acceleration)
+    later = DT / FINE * np.arange((STEPS - grown) * FINE + 1.0)
+    begun = flown[grown, 0] if grown < STEPS else flown[-1, -1]
+    keeps = begun + later[:, None] * velocity
+    for n in range(grown, STEPS):
+        flown[n] = keeps[(n - grown) * FINE : (n - grown + 1) * FINE + 1]
+    off = np.linalg.norm(flown - curves(centres, FINE + 1), axis=-1)
+    assert (off <= radii[:, None] + 1e-9).all()
+    assert np.ptp(radii[max(grown - 1, 0) :]) <= 1e-12
+
+
 @given(seeds, st.floats(0.0, 5.0))
 def test_who_was_heard_longer_ago_may_be_further_off(seed: int, age: float) -> None:
     velocity = np.random.default_rng(seed).normal(size=3)

@@ -95,6 +95,23 @@ def test_a_thing_is_where_it_says_and_a_vehicle_only_nearly() -> None:
     assert np.isclose(least[1], 0.5 + 2.0 * (own.tube + clock) + np.sqrt(2.0) * sigma)
 
 
+@pytest.mark.parametrize("growth", [0, 500_000, 1_100_000])
+def test_balls_grow_for_the_configured_time_and_move_on(growth: int) -> None:
+    """Afterwards they keep their radius and have the received velocity."""
+    of, velocity = config(noncooperative_growth_us=growth), np.array([0.0, 2.0, 0.0])
+    world = World(of, OWN, 10, FLEET)
+    announced(world, HERE + np.array([50.0, 0.0, 0.0]), velocity)
+    seeing, own = NonCooperative(of, STEPS), np.tile(HERE, (STEPS, 3, 1))
+    ((centres, radii),) = seeing.balls(seeing.seen(NOW, frozenset(), world), own)
+    step = 1e-6 * of.certified.dt_us
+    grown = int(np.ceil(1e-6 * growth / step))
+    grows = np.diff(radii) > 0.0
+    assert grows[: max(grown - 1, 0)].all()
+    assert not grows[max(grown - 1, 0) :].any()
+    went = centres[grown:, 2] - centres[grown:, 0]
+    np.testing.assert_allclose(went, np.tile(step * velocity, (STEPS - grown, 1)), atol=1e-3)
+
+
 def test_a_target_that_falls_silent_is_kept_clear_of_where_it_was_last() -> None:
     of = config().model_copy(update={"target_d_min": 1.0, "target_d_safe": 4.0})
     world, place = World(of, OWN, OTHER, FLEET), HERE + np.array([3.0, 0.0, 0.0])
