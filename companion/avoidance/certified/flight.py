@@ -26,6 +26,7 @@ from companion.avoidance.certified.reservation import Reservation
 from companion.avoidance.certified.told_goals import ToldGoals
 from companion.avoidance.certified.tube_watch import TubeWatch
 from companion.avoidance.certified.vicinity import Vicinity
+from companion.avoidance.certified.way_obstacles import WayObstacles
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
@@ -67,7 +68,8 @@ class CertifiedFlight:
         self._last_step = 0
         self._sources = ConstraintSources(config, steps)
         self._told = ToldGoals(own, fleet.fingerprint)
-        self._places = Places(config, own.system, self._told, self._sources)
+        obstacles = WayObstacles(config)
+        self._places = Places(config, own.system, self._told, obstacles)
         downwash, between = config.field.downwash, self._sources.between
         distances = Distances(
             between,
@@ -99,7 +101,7 @@ class CertifiedFlight:
         self._steps = steps
         self.tube = TubeWatch(config, self.commitment)
         self._goals = PlanGoals(
-            config, own, self.agreements, self._sources, self._told, self._deadlock_turn, sense
+            config, own, self.agreements, obstacles, self._told, self._deadlock_turn, sense
         )
         self._in_control = self._received = False
         self._prepared, self._begun_at = False, 0
