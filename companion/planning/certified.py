@@ -239,7 +239,7 @@ class CertifiedAvoidance:
         aim = None if situation.stale else situation.aim()
         if aim is None:
             flight.commitment.carry_on(HoldReason.MISSING)
-        elif flight.lost:
+        elif flight.tube.lost:
             flight.anchor(now, situation.measured)
         else:
             self._plans += flight.plan(now, aim, self._world, situation.view)

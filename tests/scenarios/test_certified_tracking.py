@@ -30,7 +30,7 @@ HELPED = {"companion": {"tracking": {"compensate": True}, "limits": {"j_max": [3
 def deviation(companion: Companion) -> float:
     avoidance = companion.avoidance
     assert isinstance(avoidance, CertifiedAvoidance)
-    return avoidance._flight.largest_deviation
+    return avoidance._flight.tube.largest_deviation
 
 
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])

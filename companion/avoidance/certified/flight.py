@@ -7,6 +7,7 @@ from math import hypot
 import numpy as np
 
 from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.announcements import Announcements
 from companion.avoidance.certified.clocks import ClockWatch
 from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.commitment import Commitment, HoldReason
@@ -21,10 +22,11 @@ from companion.avoidance.certified.places import Places
 from companion.avoidance.certified.plan_goals import PlanGoals
 from companion.avoidance.certified.plan_sides import plan_sides
 from companion.avoidance.certified.qp import Objective, SeparationQp
-from companion.avoidance.certified.repetition import EPOCHS, Repetition
 from companion.avoidance.certified.reservation import Reservation
 from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.tube_watch import TubeWatch
 from companion.avoidance.certified.vicinity import Vicinity
+from companion.avoidance.certified.way_obstacles import WayObstacles
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.values.horizon import Array, Horizon, Motion
@@ -33,11 +35,9 @@ from mavlink_bridge.errors import PlanWireError
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import Message, Source, Timesync, Tunnel
 from mavlink_bridge.wire.agreements import PAYLOAD_TYPE as AGREEMENTS
-from mavlink_bridge.wire.agreements import Statement, in_messages
-from mavlink_bridge.wire.agreements import pack as pack_statement
 from mavlink_bridge.wire.agreements import unpack as unpack_statement
 from mavlink_bridge.wire.goal import PAYLOAD_TYPE as GOAL
-from mavlink_bridge.wire.plan import PAYLOAD_TYPE, WirePlan, pack
+from mavlink_bridge.wire.plan import PAYLOAD_TYPE
 
 _TURNING_SENSES = {"left": -1.0}
 _STOOD_US = 1_000_000
@@ -68,7 +68,8 @@ class CertifiedFlight:
         self._last_step = 0
         self._sources = ConstraintSources(config, steps)
         self._told = ToldGoals(own, fleet.fingerprint)
-        self._places = Places(config, own.system, self._told, self._sources)
+        obstacles = WayObstacles(config)
+        self._places = Places(config, own.system, self._told, obstacles)
         downwash, between = config.field.downwash, self._sources.between
         distances = Distances(
             between,
@@ -88,7 +89,9 @@ class CertifiedFlight:
         self.reservation = Reservation(
             certified, self.commitment, self.agreements, beside(certified, config.field, config.limits)
         )
-        self._repetition = Repetition(certified)
+        self._announcements = Announcements(
+            own, certified, self.commitment, self.agreements, self.reservation, self._told
+        )
         self.clocks = ClockWatch(own, certified.clock_us)
         self._column_within = max(config.guard.tube, certified.drift)
         # The feed-forward of set-points needs the next plan before the lag of the attitude reaches it.
@@ -96,21 +99,14 @@ class CertifiedFlight:
         self._replies: list[Timesync] = []
         self._seconds: Array = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
         self._steps = steps
-        self.deviation = self.largest_deviation = 0.0
-        """Distance (m) of the vehicle from its plan: ``deviation`` now, ``largest_deviation`` at most."""
-        self.left_tube = 0
-        """Number of times that the vehicle left the tube."""
-        self._outside = 0.0
+        self.tube = TubeWatch(config, self.commitment)
         self._goals = PlanGoals(
-            config, own, self.agreements, self._sources, self._told, self._deadlock_turn, sense
+            config, own, self.agreements, obstacles, self._told, self._deadlock_turn, sense
         )
-        self._in_control = self._announced = self._received = self._participated = False
-        self._turn = 0
+        self._in_control = self._received = False
         self._prepared, self._begun_at = False, 0
         self._polled_at: int | None = None
         self._place: tuple[int, Array | None] | None = None
-        self._next_announcement = 0
-        self._unsent: int | None = None
         self.lookahead_s = float(self._seconds[-1]) + 1e-6 * certified.epoch_us
         """Time (s) from now to the end of the plan that is made next, at most."""
 
@@ -174,8 +170,8 @@ class CertifiedFlight:
             # Without a plan the vehicle rests. It may fly elsewhere later: there once more.
             self._prepared = False
         self.reservation.watch(now)
-        commitment.anchored_anew += self._announced
-        self._in_control = self._announced = False
+        commitment.anchored_anew += self._announcements.begin()
+        self._in_control = False
 
     def park(self, now: int, measured: Motion, *, joins: bool, climbs: bool = False) -> None:
         """Hold the column of a vehicle that stands on the ground, or ``climbs`` by its autopilot.
@@ -322,35 +318,13 @@ class CertifiedFlight:
         self.agreements.begin(self.commitment.anchor(now, measured))
 
     def watch(self, now: int, measured: Motion) -> None:
-        """Record how far the vehicle is from its plan.
-
-        Outside the tube the guarantee is suspended; the plan stays, because the autopilot returns to it. The
-        statements give the excess, and until the vehicle is back, it and the others keep more distance in new
-        plans, each two of them twice the excess, where their committed plans do.
-        """
-        horizon = self.commitment.horizon()
-        if horizon is None:
-            return
-        difference = horizon.at(now).position - measured.position
-        certified, plan = self._config.certified, self.commitment.of(now)
-        within = certified.tube
-        if plan is not None and plan.column:
-            difference[2], within = 0.0, max(certified.tube, certified.drift)
-        self.deviation = float(np.sqrt(difference @ difference))
-        self.largest_deviation = max(self.largest_deviation, self.deviation)
-        outside = max(0.0, self.deviation - within)
-        self.left_tube += outside > 0.0 and not self._outside
-        self._outside = outside
+        """Record how far the vehicle is from its plan (``TubeWatch.watch``)."""
+        self.tube.watch(now, measured)
 
     @property
     def enclosed(self) -> bool:
         """Whether fixed obstacles leave no way from the end of the plan to the destination."""
         return self._goals.enclosed
-
-    @property
-    def lost(self) -> bool:
-        """Whether the vehicle is further than ``guard.tube`` (m) from its plan: planning then begins anew."""
-        return self.deviation > self._config.guard.tube
 
     def plan(self, now: int, aim: Aim, world: World, view: View) -> bool:
         """Make the next epoch's plan towards ``aim``; return False if the committed plan continues.
@@ -367,7 +341,7 @@ class CertifiedFlight:
         subgoal, goal = self._goals.chosen(now, epoch, start, own, destination, given=given, moving=moving)
         others, field = self._sources.around(now, epoch, own, goal, self.agreements, world, view)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
-        return commitment.replan(objective, subgoal, others, max(self._outside, self.agreements.outside))
+        return commitment.replan(objective, subgoal, others, max(self.tube.outside, self.agreements.outside))
 
     def _objective(self, begins: float, aim: Aim, goal: Array, field: Array) -> Objective:
         """Return the preferred places of a plan that begins in ``begins`` s and should end at ``goal`` (3,).
@@ -386,7 +360,7 @@ class CertifiedFlight:
     def idle(self, now: int) -> bool:
         """Return whether there is nothing to make or to announce until something else is due."""
         following = self.commitment.following
-        waiting = following is not None and now < following.epoch and now < self._next_announcement
+        waiting = following is not None and now < following.epoch and now < self._announcements.next_at
         return waiting and not self._replies and not self._received and not self.agreements.changed
 
     def horizon(self) -> Horizon | None:
@@ -404,78 +378,16 @@ class CertifiedFlight:
         """
         sync: list[Message] = [*self._replies, *self.clocks.due(now)]
         self._replies.clear()
-        self._unsent = None
         if farewell:
             self.commitment.turn(now)
             farewell = self.commitment.following is None
         elif self._polled_at != now:
             self._in_control = False
-        announced = self.commitment.announced()
-        if announced is None or not (self._in_control or farewell):
-            return [*sync, *self._away(now)]
+        if self.commitment.announced() is None or not (self._in_control or farewell):
+            return [*sync, *self._announcements.away(now)]
         self._agree(now)
-        if announced.epoch == self.commitment.announced_until and now < self._next_announcement:
-            return [*sync, *self._statements(announced.epoch, every=False)] if not farewell else sync
-        if announced.epoch != self.commitment.announced_until:
-            self._repetition.update(now, self.agreements.received(now, EPOCHS))
-            self._unsent = self.commitment.announced_until
-        self.commitment.announced_until = announced.epoch
-        self._next_announcement = now + self._repetition.period
-        self._announced = True
-        self._participated = not farewell
-        if farewell:
-            self.agreements.leave(announced.epoch)
-        statements = self._statements(announced.epoch, every=True, farewell=farewell)
-        plans = [announced, *self._repeated()]
-        tunnels = [Tunnel(self._own, 0, 0, PAYLOAD_TYPE, pack(plan)) for plan in plans]
-        return [*sync, *tunnels, *statements, *self._told.messages()]
+        return [*sync, *self._announcements.messages(now, self.tube.outside, farewell=farewell)]
 
     def recall(self) -> bool:
-        """Carry the plan on in place of the one that the last ``messages`` announced for the first time.
-
-        Call it if these messages are not sent. Returns False, and changes nothing, for a plan with which the
-        vehicle begins anew, for a farewell, and for a plan in space that was a column. The last two go on
-        with the plan before; after an anchor the vehicle is beside its new plan until it has followed.
-        """
-        commitment, before = self.commitment, self._unsent
-        announced, following = commitment.announced(), commitment.following
-        if before is not None and announced is not None:
-            start = None if following is None else commitment.start()
-            released = start is not None and start.column and not announced.column
-            first = announced.epoch <= self.agreements.since
-            if released or first or not self.agreements.recall(announced.epoch):
-                return False
-            if start is not None and start != announced:
-                commitment.carry_on(HoldReason.LATE)
-            if self.agreements.unreserved() or not commitment.column:
-                self.reservation.withdraw()
-            commitment.announced_until = before
-        # The statements, too, are to be repeated at once.
-        self._unsent, self._next_announcement = None, 0
-        return True
-
-    def _away(self, now: int) -> list[Message]:
-        """Return the statement that another controller flies the vehicle, if plans were announced before."""
-        if not self._participated or now < self._next_announcement:
-            return []
-        self._next_announcement = now + self._config.certified.repeat_us
-        epoch = max(self.commitment.epoch(now), self.commitment.announced_until)
-        statement = Statement(self.agreements.fingerprint, epoch, self.agreements.since, away=True)
-        return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(statement))]
-
-    def _repeated(self) -> list[WirePlan]:
-        """Return one of the plans that a peer needs for a proposal, each in turn."""
-        plans = self.agreements.unanswered()
-        self._turn += 1
-        return [plans[self._turn % len(plans)]] if plans else []
-
-    def _statements(self, epoch: int, *, every: bool, farewell: bool = False) -> list[Message]:
-        """Return the statement of ``every`` agreement, or of those that changed; ``epoch`` (µs): own plan."""
-        agreements = self.agreements
-        if not every and not agreements.changed:
-            return []
-        entries = agreements.entries(every=every)
-        statement = Statement(
-            agreements.fingerprint, epoch, agreements.since, entries, farewell, outside=self._outside
-        )
-        return [Tunnel(self._own, 0, 0, AGREEMENTS, pack_statement(part)) for part in in_messages(statement)]
+        """Take back what the last ``messages`` announced, if they are not sent (``Announcements.recall``)."""
+        return self._announcements.recall()

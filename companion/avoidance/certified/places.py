@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.avoidance.certified.agreements import Agreements
-from companion.avoidance.certified.constraint_sources import BESIDE_M, ConstraintSources
 from companion.avoidance.certified.free_place import covered, free_place
 from companion.avoidance.certified.surface_places import Candidate, Taken, place_of
 from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.way_obstacles import BESIDE_M, WayObstacles
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.config.formation import Nearest
@@ -25,13 +25,11 @@ _ROUNDING_M = 1e-6
 class Places:
     """Chooses where plans of the vehicle ``own`` (system id) end.
 
-    ``sources``: what constrains them; ``told``: goals of the others.
+    ``obstacles``: what constrains them; ``told``: goals of the others.
     """
 
-    def __init__(
-        self, config: CompanionConfig, own: int, told: ToldGoals, sources: ConstraintSources
-    ) -> None:
-        self._config, self._own, self._told, self._sources = config, own, told, sources
+    def __init__(self, config: CompanionConfig, own: int, told: ToldGoals, obstacles: WayObstacles) -> None:
+        self._config, self._own, self._told, self._obstacles = config, own, told, obstacles
         # Another formation has places of its own.
         self._assigns = isinstance(config.formation, Nearest)
         limits = config.limits.within(config.field.margin(1))
@@ -52,9 +50,9 @@ class Places:
         ends, left = agreements.ends(), agreements.left
         if not ends and not left:
             return destination
-        reach = self._sources.between + BESIDE_M
+        reach = self._obstacles.between + BESIDE_M
         taken = [
-            Taken(last.controls[-1, 2] - target, self._sources.from_last(last) + BESIDE_M, 0.0)
+            Taken(last.controls[-1, 2] - target, self._obstacles.from_last(last) + BESIDE_M, 0.0)
             for last in left.values()
         ]
         candidates = [Candidate(self._own, rest - target, surface)]
@@ -86,7 +84,7 @@ class Places:
             return np.asarray(inside)
         if self._config.planar:
             places = np.column_stack([places[:, :2], np.broadcast_to(ends[..., 2], len(places))])
-        return np.asarray(inside & self._sources.clear_of_fixed(places))
+        return np.asarray(inside & self._obstacles.clear_of_fixed(places))
 
     def _beside_goal(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
         """Return ``goal`` (3,), m, or the nearest free place if a vehicle that said farewell covers it.
@@ -97,11 +95,11 @@ class Places:
         if not left:
             return goal
         ends = np.array([last.controls[-1, 2, :2] for last in left.values()])
-        radii = np.array([self._sources.from_last(last) for last in left.values()])
+        radii = np.array([self._obstacles.from_last(last) for last in left.values()])
         if not covered(goal[:2], ends, radii):
             return goal
         asking = [one.position_m for one in self._told.recent(now).values() if one.room]
-        for discs in self._sources.resting(epoch, rest, goal, agreements, asking):
+        for discs in self._obstacles.resting(epoch, rest, goal, agreements, asking):
             place = free_place(goal[:2], discs, self._low[:2], self._high[:2])
             if place is not None:
                 return np.array([place[0], place[1], goal[2]])

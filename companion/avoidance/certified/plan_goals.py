@@ -15,13 +15,13 @@ import numpy as np
 
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.anticipation import NOBODY, Anticipated, Anticipation
-from companion.avoidance.certified.constraint_sources import BESIDE_M, ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.detour import Detour
 from companion.avoidance.certified.lane_goals import LaneGoals
 from companion.avoidance.certified.margins import from_surfaces
 from companion.avoidance.certified.room import Room
 from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.way_obstacles import BESIDE_M, WayObstacles
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
 from companion.values.vectors import limit
@@ -51,14 +51,14 @@ class PlanGoals:
         config: CompanionConfig,
         own: Source,
         agreements: Agreements,
-        sources: ConstraintSources,
+        obstacles: WayObstacles,
         told: ToldGoals,
         turn: DeadlockTurn,
         sense: float,
     ) -> None:
         certified, limits = config.certified, config.limits
         self._config = config
-        self._agreements, self._sources, self._told = agreements, sources, told
+        self._agreements, self._obstacles, self._told = agreements, obstacles, told
         self._deadlock_turn = turn
         self._detour = Detour(limits.within(config.field.margin(1)), certified.deadlock.detour)
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
@@ -68,14 +68,14 @@ class PlanGoals:
         self._space: SpaceDetour | None = None
         self._has_space = self._way is None and not config.planar
         self._least = least
-        self._anticipation = Anticipation(config, sources.between, sense)
+        self._anticipation = Anticipation(config, obstacles.between, sense)
         in_lanes = config.way is not None and config.way.lanes is not None
         # In space vehicles pass over each other, in lanes they give way.
         self._anticipates = config.planar and certified.anticipation.most > 0.0 and not in_lanes
         self._lane_goals = LaneGoals(own.system, told, self._way, in_use=in_lanes)
         # In lanes vehicles make room by steps, and tell their goals for that.
         self._gives_way = in_lanes
-        self._room = None if in_lanes else Room(config, own.system, told, sources)
+        self._room = None if in_lanes else Room(config, own.system, told, obstacles)
         self._in_lane = False
         self._began_at: Array | None = None
 
@@ -89,7 +89,7 @@ class PlanGoals:
         if self._way is not None:
             self._way.prepare(height)
         if self._has_space and self._space is None:
-            kept, between = self._least - BESIDE_M, self._sources.between
+            kept, between = self._least - BESIDE_M, self._obstacles.between
             self._space = space_detour_of(self._config, kept, between, BESIDE_M)
             self._space.prepare()
 
@@ -122,7 +122,7 @@ class PlanGoals:
         subgoal = self._subgoal(now, epoch, rest, aim)
         goal = subgoal.place
         if room is not None:
-            occupied = self._deadlock_turn.stalled and self._sources.occupied(
+            occupied = self._deadlock_turn.stalled and self._obstacles.occupied(
                 epoch, destination, self._agreements
             )
             asked = room.asked(rest, goal, closed=self._closed, occupied=occupied)
@@ -152,7 +152,7 @@ class PlanGoals:
         way, stalled = self._way, self._deadlock_turn.stalled
         begun = self._begun()
         if way is not None and stalled:
-            way.go_round(now, lambda: self._sources.at_rest(epoch, self._agreements))
+            way.go_round(now, lambda: self._obstacles.at_rest(epoch, self._agreements))
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
         in_lane = self._lane_goals.subgoal(rest, destination, self._agreements.ends)
         if self._in_lane != (in_lane is not None):
@@ -175,7 +175,7 @@ class PlanGoals:
         stalled = self._deadlock_turn.stalled
         if self._space is not None:
             subgoal = self._space.towards(
-                now, rest, goal, lambda: self._sources.at_rest(epoch, self._agreements), stalled=stalled
+                now, rest, goal, lambda: self._obstacles.at_rest(epoch, self._agreements), stalled=stalled
             )
             if not self._space.enclosed:
                 self._detour.forget()
@@ -184,7 +184,7 @@ class PlanGoals:
             now,
             rest,
             goal,
-            lambda: self._sources.resting(epoch, rest, goal, self._agreements),
+            lambda: self._obstacles.resting(epoch, rest, goal, self._agreements),
             stalled=stalled,
         )
 

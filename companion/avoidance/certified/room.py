@@ -18,10 +18,10 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.avoidance.certified.agreements import Agreements
-from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.free_place import covered, free_places
 from companion.avoidance.certified.told_goals import REACHED_M, ToldGoals
 from companion.avoidance.certified.visibility_graph import Discs, free, without
+from companion.avoidance.certified.way_obstacles import WayObstacles
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
 from companion.values.vectors import limit
@@ -47,12 +47,10 @@ class _Asking(NamedTuple):
 
 
 class Room:
-    """Room that the vehicle ``own`` (system id) asks for and makes, beside what its ``sources`` say."""
+    """Room that the vehicle ``own`` (system id) asks for and makes, beside its ``obstacles``."""
 
-    def __init__(
-        self, config: CompanionConfig, own: int, told: ToldGoals, sources: ConstraintSources
-    ) -> None:
-        self._own, self._told, self._sources = own, told, sources
+    def __init__(self, config: CompanionConfig, own: int, told: ToldGoals, obstacles: WayObstacles) -> None:
+        self._own, self._told, self._obstacles = own, told, obstacles
         limits = config.limits.within(config.field.margin(1))
         self._low, self._high = np.array(limits.box_min[:2]), np.array(limits.box_max[:2])
         self._planar, self._downwash = config.planar, config.field.downwash
@@ -92,7 +90,7 @@ class Room:
         only = occupied and not closed and (self._occupied or not self._asks)
         if (closed or only) and not self._there and self._aside is None:
             self._occupied, self._asks, self._closed_at = only, True, rest
-        longest = _LONG * self._sources.between
+        longest = _LONG * self._obstacles.between
         self._asks &= float(np.linalg.norm(rest - self._closed_at)) < longest
         if self._aside is not None and self._rank == 0:
             return None
@@ -110,7 +108,7 @@ class Room:
         if not counted:
             self._rank = 0
             return None
-        resting, fixed = self._sources.resting(epoch, rest, goal, agreements)
+        resting, fixed = self._obstacles.resting(epoch, rest, goal, agreements)
         if self._aside is not None:
             kept = [self._corridor(one, ends.get(one.system), goal, _KEPT) for one in asking]
             if not any(covered(self._aside[:2], discs.centres, discs.radii) for discs in kept):
@@ -140,7 +138,7 @@ class Room:
         for system, one in self._told.recent(now).items():
             if one.room is None or one.room.rank >= _MOST_RANK or (one.room.rank, system) >= mine:
                 continue
-            if one.room.rank or self._sources.apart(one.position_m - goal) >= self._sources.between:
+            if one.room.rank or self._obstacles.apart(one.position_m - goal) >= self._obstacles.between:
                 found.append(_Asking(system, one.position_m, one.room))
         return sorted(found, key=lambda one: (one.room.rank, one.system))
 
@@ -149,7 +147,7 @@ class Room:
 
         That of a vehicle on the way to its goal includes the place around it.
         """
-        between = self._sources.between
+        between = self._obstacles.between
         onwards = asking.room.next_place_m
         first = onwards if end is None else end
         # What others tell is not bounded.

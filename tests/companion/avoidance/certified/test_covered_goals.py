@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from companion.avoidance.certified.committed import resting as at_rest
-from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
 from companion.avoidance.certified.peer_plans import stored
 from companion.avoidance.certified.places import Places
 from companion.avoidance.certified.plan_goals import PlanGoals
 from companion.avoidance.certified.room import Room
 from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.way_obstacles import WayObstacles
 from companion.avoidance.field.planner import standing
 from companion.config import CompanionConfig
 from companion.config.certified import DeadlockConfig
@@ -34,9 +34,9 @@ class Beside:
     def __init__(self, *, planar: bool) -> None:
         config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
         self.told = ToldGoals(Source(1, 1), 7)
-        sources = ConstraintSources(config, STEPS)
-        self.d = sources.between
-        self._places = Places(config, 1, self.told, sources)
+        obstacles = WayObstacles(config)
+        self.d = obstacles.between
+        self._places = Places(config, 1, self.told, obstacles)
         landed = {9: stored(at_rest(EPOCH, DT, STEPS, ORIGIN, 7))}
         self._agreements: Any = SimpleNamespace(left=landed, columns=(), resting=lambda *_: {})
 
@@ -83,8 +83,8 @@ def told(
     """
     document = {"avoidance": "certified", "planar": planar, "limits": limits}
     config = CompanionConfig.model_validate(document)
-    sources, goals_told = ConstraintSources(config, STEPS), ToldGoals(Source(1, 1), 7)
-    rest = ORIGIN - 0.6 * sources.between * EAST
+    obstacles, goals_told = WayObstacles(config), ToldGoals(Source(1, 1), 7)
+    rest = ORIGIN - 0.6 * obstacles.between * EAST
     agreements: Any = SimpleNamespace(
         left={9: stored(at_rest(EPOCH, DT, STEPS, landed, 7))},
         columns=(),
@@ -94,7 +94,7 @@ def told(
         age=lambda *_: 0.0,
     )
     turn = DeadlockTurn(DeadlockConfig(), 1.0)
-    goals = PlanGoals(config, Source(1, 1), agreements, sources, goals_told, turn, 1.0)
+    goals = PlanGoals(config, Source(1, 1), agreements, obstacles, goals_told, turn, 1.0)
     goals.prepare(5.0)
     own, start = np.tile(rest, (STEPS, 3, 1)), at_rest(EPOCH, DT, STEPS, rest, 7)
     against = Pushes(np.array([[-50.0, 0.0, 0.0]]), np.zeros((1, 3)))
@@ -142,9 +142,9 @@ class Asking:
 
     def __init__(self) -> None:
         config = CompanionConfig.model_validate({"avoidance": "certified", "planar": True})
-        sources = ConstraintSources(config, STEPS)
-        self.d = sources.between
-        self._room = Room(config, 1, ToldGoals(Source(1, 1), 7), sources)
+        obstacles = WayObstacles(config)
+        self.d = obstacles.between
+        self._room = Room(config, 1, ToldGoals(Source(1, 1), 7), obstacles)
 
     def rank(self, before: float, *, closed: bool = False) -> int | None:
         """The rank with which it asks, ``before`` (m) its goal, on which one rests; None: none."""

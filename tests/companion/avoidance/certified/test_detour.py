@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from companion.avoidance.certified import detour as module
-from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.detour import Detour, Subgoal
 from companion.avoidance.certified.room import Room
 from companion.avoidance.certified.visibility_graph import Discs, Rectangles, finding, free
+from companion.avoidance.certified.way_obstacles import WayObstacles
 from companion.config import CompanionConfig
 from companion.config.planning import LimitsConfig
 from companion.values.horizon import Array
-from tests.companion.avoidance.certified.plans import EPOCH, STEPS
+from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.rough import Habits, Rough
 from tests.companion.avoidance.certified.swarm import Swarm
 from tests.companion.ways.worlds import result
@@ -348,7 +348,7 @@ def test_a_box_below_an_end_leaves_the_ways_around_the_rest(turned: bool) -> Non
     here, there = ends[::-1] if turned else ends
     config = CompanionConfig.model_validate({"avoidance": "certified", "obstacles": [box, post]})
     none: Any = SimpleNamespace(left={}, columns=(), resting=lambda *_: {})
-    (discs, _) = ConstraintSources(config, STEPS).resting(0, here, there, none)
+    (discs, _) = WayObstacles(config).resting(0, here, there, none)
     found = way(here[:2], there[:2], discs, *np.array([[-50.0, -50.0], [50.0, 50.0]]))
     assert found is not None
     assert np.abs(found[:, 1]).max() > 1.0

@@ -94,7 +94,7 @@ def test_who_leaves_its_tube_states_by_how_much_until_it_is_back() -> None:
     pair.run(1_000_000, 2_000_000, outside)
     assert pair.stated == {1: pytest.approx(0.35), 2: 0.0}
     assert pair.flights[2].agreements.outside == pytest.approx(0.35)
-    assert pair.flights[1].left_tube == 1
+    assert pair.flights[1].tube.left == 1
     pair.run(2_000_000, 3_000_000, inside)
     assert pair.stated == {1: 0.0, 2: 0.0}
     assert pair.flights[2].agreements.outside == 0.0

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from companion.avoidance.certified.committed import resting as at_rest
-from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
 from companion.avoidance.certified.plan_goals import PlanGoals
 from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.way_obstacles import WayObstacles
 from companion.config import CompanionConfig
 from companion.config.certified import DeadlockConfig
 from mavlink_bridge.messages import Source
@@ -28,8 +28,8 @@ def test_a_way_through_gaps_that_open_and_close_is_no_progress() -> None:
     """With each new way at the same place progress began anew, so the vehicle never counted as stalled."""
     limits = {"box_min": (-6.0, -4.7, 0.5), "box_max": (6.0, 4.7, 2.0), "v_max": (1.0, 1.0, 0.5)}
     config = CompanionConfig.model_validate({"avoidance": "certified", "limits": limits})
-    plans, sources = 0, ConstraintSources(config, STEPS)
-    d = sources.between
+    plans, obstacles = 0, WayObstacles(config)
+    d = obstacles.between
 
     def resting(_since: int, _still: float) -> dict[int, Any]:
         shut = -2.5 if (plans // BY_TURNS) % 2 else 2.5
@@ -37,7 +37,7 @@ def test_a_way_through_gaps_that_open_and_close_is_no_progress() -> None:
 
     agreements: Any = SimpleNamespace(left={}, columns=(), resting=resting, ends=lambda: resting(0, 0.0))
     turn = DeadlockTurn(DeadlockConfig(), 1.0)
-    goals = PlanGoals(config, Source(1, 1), agreements, sources, ToldGoals(Source(1, 1), 7), turn, 1.0)
+    goals = PlanGoals(config, Source(1, 1), agreements, obstacles, ToldGoals(Source(1, 1), 7), turn, 1.0)
     goals.prepare(1.2)
     rest, goal = np.array([-2.7 * d, 0.0, 1.2]), np.array([2.7 * d, 0.0, 1.2])
     own, start = np.tile(rest, (STEPS, 3, 1)), at_rest(EPOCH, DT, STEPS, rest, 7)
@@ -60,11 +60,11 @@ def least_angle(blocking: dict[int, Any], *, planar: bool) -> float:
     ``blocking``: vehicles that rest, at their places (3,), m; its goal is 9 m to the east of the origin.
     """
     config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
-    sources = ConstraintSources(config, STEPS)
+    obstacles = WayObstacles(config)
     others: dict[str, Any] = {"left": {}, "columns": (), "newest": dict, "age": lambda *_: 0.0}
     agreements: Any = SimpleNamespace(**others, resting=lambda *_: blocking, ends=lambda: blocking)
     turn = DeadlockTurn(DeadlockConfig(), 1.0)
-    goals = PlanGoals(config, Source(1, 1), agreements, sources, ToldGoals(Source(1, 1), 7), turn, 1.0)
+    goals = PlanGoals(config, Source(1, 1), agreements, obstacles, ToldGoals(Source(1, 1), 7), turn, 1.0)
     goals.prepare(5.0)
     rest, goal = np.array([0.0, 0.0, 5.0]), np.array([9.0, 0.0, 5.0])
     own, start = np.tile(rest, (STEPS, 3, 1)), at_rest(EPOCH, DT, STEPS, rest, 7)

@@ -137,9 +137,9 @@ def test_how_far_a_vehicle_is_from_its_plan_is_judged_by_the_plan_of_the_epoch(c
         flight.commitment.turn(now)
         flight.commitment.leave_column()
     flight.watch(now + LENGTH - 1, Motion(here + UP, np.zeros(3), np.zeros(3)))
-    assert flight.deviation == pytest.approx(1.0 if column else 0.0, abs=1e-3)
+    assert flight.tube.deviation == pytest.approx(1.0 if column else 0.0, abs=1e-3)
     flight.watch(now + LENGTH, Motion(here + UP, np.zeros(3), np.zeros(3)))
-    assert flight.deviation == pytest.approx(0.0 if column else 1.0, abs=1e-3)
+    assert flight.tube.deviation == pytest.approx(0.0 if column else 1.0, abs=1e-3)
 
 
 def test_who_is_below_a_hovering_vehicle_waits_and_does_not_stop_it() -> None:

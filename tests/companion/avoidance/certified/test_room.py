@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.room import Room
 from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.way_obstacles import WayObstacles
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Source
 from mavlink_bridge.wire.goal import WireRoom, goal_at, pack, room_to
-from tests.companion.avoidance.certified.plans import EPOCH, STEPS
+from tests.companion.avoidance.certified.plans import EPOCH
 from tests.companion.avoidance.certified.rough import Habits, Rough
 from tests.companion.avoidance.certified.swarm import Swarm
 
@@ -88,9 +88,9 @@ class Standing:
         self.config = CompanionConfig.model_validate(document)
         self.here = here
         self.told = ToldGoals(Source(own, 1), 7)
-        self.sources = ConstraintSources(self.config, STEPS)
-        self.room = Room(self.config, own, self.told, self.sources)
-        self.d = self.sources.between
+        self.obstacles = WayObstacles(self.config)
+        self.room = Room(self.config, own, self.told, self.obstacles)
+        self.d = self.obstacles.between
         self._others = {100 + k: place for k, place in enumerate([] if others is None else others)}
         self._ends: dict[int, Array] = {}
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.margins import between, from_surfaces
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.places import Places
 from companion.avoidance.certified.surface_places import Candidate, Taken, place_of
 from companion.avoidance.certified.told_goals import ToldGoals
+from companion.avoidance.certified.way_obstacles import WayObstacles
 from companion.avoidance.field.planner import Aim
 from companion.config import CompanionConfig
 from companion.obstacles.static import FixedObstacles
@@ -117,7 +117,7 @@ def assigned(config: CompanionConfig, ends: dict[int, Array]) -> dict[int, Array
     for own, end in ends.items():
         surface = config.surface_of(own)
         aim = Aim(AT + surface.nearest(end - AT), np.zeros(3), AT, AT, surface)
-        places = Places(config, own, ToldGoals(Source(own, 1), 7), ConstraintSources(config, 17))
+        places = Places(config, own, ToldGoals(Source(own, 1), 7), WayObstacles(config))
         others: Any = Ends({system: place for system, place in ends.items() if system != own})
         found[own] = places.destination(0, 0, end, aim, others)
     return found
