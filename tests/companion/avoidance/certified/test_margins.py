@@ -64,7 +64,7 @@ def test_the_balls_hold_every_motion_within_the_bounds(
 def test_the_balls_hold_a_vehicle_that_keeps_its_velocity_after_the_growth(
     seed: int, age: float, speed: float, acceleration: float, growth: float
 ) -> None:
-    """Up to ``growth`` it moves anyhow within the bounds, from the next knot on with the received velocity."""
+    """Up to ``growth`` it moves anyhow within the bounds, from the next knot on as it was received."""
     rng = np.random.default_rng(seed)
     direction = rng.normal(size=3)
     velocity = rng.uniform() ** 0.3 * speed * direction / np.linalg.norm(direction)
