@@ -223,6 +223,11 @@ class NeighbourTracks:
             if system not in without
         ]
 
+    def turn_rates(self) -> dict[int, float]:
+        """Return ``Neighbours.turn_rates``."""
+        beliefs = ((system, sender.track.belief) for system, sender in self._senders.items())
+        return {system: belief.turn[0] for system, belief in beliefs if belief is not None}
+
     def as_arrived(self) -> list[tuple[int, int, Array, Array]]:
         """Return what ``last_received`` does, dated by arrival, of systems whose last message seems late.
 

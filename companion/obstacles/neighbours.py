@@ -336,6 +336,13 @@ class Neighbours:
         """
         return self._tracks.last_received(without)
 
+    def turn_rates(self) -> dict[int, float]:
+        """Return the turn rates (rad/s, counter-clockwise from above) of the last states, by system id.
+
+        They are 0 unless ``neighbour.sigma_turn`` is set.
+        """
+        return self._tracks.turn_rates()
+
     def as_arrived(self) -> list[tuple[int, int, Array, Array]]:
         """Return what ``last_received`` does, dated by arrival, where the last message seems late.
 

@@ -23,6 +23,10 @@ class _Neighbours:
         """Return ``Neighbours.last_received`` in fleet time."""
         return self._in_fleet_time(self._neighbours.last_received(without))
 
+    def turn_rates(self) -> dict[int, float]:
+        """Return ``Neighbours.turn_rates``."""
+        return self._neighbours.turn_rates()
+
     def as_arrived(self) -> list[tuple[int, int, Array, Array]]:
         """Return ``Neighbours.as_arrived`` in fleet time."""
         return self._in_fleet_time(self._neighbours.as_arrived())

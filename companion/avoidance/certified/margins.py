@@ -7,13 +7,18 @@ times the error of its clock.
 
 from __future__ import annotations
 
+from functools import partial
 from math import inf, sqrt
 
 import numpy as np
 
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import FieldConfig, LimitsConfig
+from companion.estimation.turn_rate import turning_path
 from companion.values.horizon import Array
+
+_ARC = 1.0 / 24.0
+"""Largest distance of an arc from the quadratic curve with its ends, as a share of v ω² dt³."""
 
 
 def fastest(limits: LimitsConfig) -> float:
@@ -78,6 +83,7 @@ def reachable(
     speed: float,
     acceleration: float,
     growth: float = inf,
+    turn_rate: float = 0.0,
 ) -> tuple[Array, Array]:
     """Return balls that hold a non-cooperative vehicle: centres (n, 3, 3) and radii (n,), m.
 
@@ -86,7 +92,8 @@ def reachable(
     (3,), m, with ``velocity`` (3,), m/s, ``age`` seconds before time 0 of ``seconds`` (n + 1,), the knots.
     Two balls hold it: one about its last position, one about the position at constant velocity; the smaller
     one is returned. From the first knot at or after ``growth`` (s) on the vehicle is assumed to keep
-    ``velocity``: the ball keeps its radius and moves on.
+    ``velocity``: the ball keeps its radius and moves on. With a ``turn_rate`` (rad/s, counter-clockwise from
+    above) the velocity turns, and ``acceleration`` is what the vehicle does in addition.
     """
     later = age + seconds
     begin, end = later[:-1], later[1:]
@@ -96,5 +103,14 @@ def reachable(
     flies = goes_on < stays
     times = np.stack([begin, 0.5 * (begin + end), end], axis=1)
     moved = np.where(flies[:, None], times, np.maximum(times - until, 0.0))
-    centres = position + moved[:, :, None] * velocity
-    return centres, np.where(flies, goes_on, stays)
+    radii = np.where(flies, goes_on, stays)
+    if turn_rate == 0.0:
+        return position + moved[:, :, None] * velocity, radii
+    began = np.where(flies, 0.0, until)
+    path = partial(turning_path, position, velocity, turn_rate)
+    (starts, before), (ends, after) = path(moved[:, 0] + began), path(moved[:, 2] + began)
+    length = (moved[:, 2] - moved[:, 0])[:, None]
+    middles = 0.5 * (starts + ends) + 0.25 * length * (before - after)
+    centres = position + np.stack([starts, middles, ends], axis=1) - path(began).positions[:, None]
+    # An arc is not quadratic.
+    return centres, radii + _ARC * float(np.linalg.norm(velocity)) * turn_rate**2 * length[:, 0] ** 3

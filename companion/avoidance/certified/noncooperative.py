@@ -17,6 +17,7 @@ from companion.avoidance.certified.margins import between, margin, reachable
 from companion.avoidance.field.forces import repulsion
 from companion.config import CompanionConfig
 from companion.config.obstacles import MovingPost
+from companion.estimation.turn_rate import turning_path
 from companion.obstacles.static import Axes
 from companion.values.horizon import Array
 from companion.values.obstacles import Obstacles
@@ -34,7 +35,8 @@ class NonCooperativeVehicle(NamedTuple):
     """Non-cooperative vehicle as last received.
 
     ``position`` (3,), m; ``velocity`` (3,), m/s; ``age``: time from its last message to the next epoch, s;
-    ``least``: least distance (m) from it; ``upright``: heights do not count.
+    ``least``: least distance (m) from it; ``upright``: heights do not count; ``turn_rate``: rad/s,
+    counter-clockwise from above.
     """
 
     position: Array
@@ -42,6 +44,7 @@ class NonCooperativeVehicle(NamedTuple):
     age: float
     least: float
     upright: bool
+    turn_rate: float = 0.0
 
 
 class NonCooperative:
@@ -49,6 +52,7 @@ class NonCooperative:
 
     def __init__(self, config: CompanionConfig, steps: int) -> None:
         self._config, self._steps = config, steps
+        self._turns = config.neighbour.sigma_turn > 0.0
         own = config.certified
         self._least_to_vehicle = between(own, config.field, config.limits)
         away = margin(own, config.field, config.limits)
@@ -70,6 +74,7 @@ class NonCooperative:
         found = []
         neighbours = world.neighbours
         received = *neighbours.last_received(members), *neighbours.as_arrived()
+        rates = neighbours.turn_rates() if self._turns else {}
         for system, time, position, velocity in received:
             if system not in members:
                 age = max(1e-6 * (begins - time), 0.0)
@@ -79,6 +84,7 @@ class NonCooperative:
                         velocity,
                         age,
                         *self._moving_obstacles.get(system, (self._least_to_vehicle, False)),
+                        rates.get(system, 0.0),
                     )
                 )
         return found
@@ -97,7 +103,9 @@ class NonCooperative:
         )
         found = []
         for one in seen:
-            centres, reach = reachable(one.position, one.velocity, one.age, self._seconds, *bounds)
+            centres, reach = reachable(
+                one.position, one.velocity, one.age, self._seconds, *bounds, one.turn_rate
+            )
             radii = reach + one.least
             if one.upright:
                 centres[..., 2] = own[..., 2]
@@ -137,7 +145,10 @@ class NonCooperative:
         least = self._least_distance + sensed.radius
         if seen:
             flown = np.stack(
-                [one.position + (one.age + self._seconds)[:, None] * one.velocity for one in seen]
+                [
+                    turning_path(one.position, one.velocity, one.turn_rate, one.age + self._seconds).positions
+                    for one in seen
+                ]
             )
             for place, one in zip(flown, seen, strict=True):
                 if one.upright:

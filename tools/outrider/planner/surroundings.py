@@ -107,6 +107,10 @@ class Surroundings:
         """Return nothing: the caller says when each neighbour was where, so no date is in doubt."""
         return []
 
+    def turn_rates(self) -> dict[int, float]:
+        """Return nothing: the caller gives no turn rates of neighbours."""
+        return {}
+
     def bounds(self, _now: int, _place: Array) -> None:
         """Return None: the caller says where the neighbours are, so none is unheard."""
 
