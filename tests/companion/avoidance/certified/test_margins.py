@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from companion.avoidance.certified.margins import between, from_surfaces, margin, reachable
 from companion.config.certified import CertifiedConfig
 from companion.config.planning import FieldConfig, LimitsConfig
+from companion.estimation.turn_rate import turning_path
 from companion.values.horizon import Array
 from tests.companion.avoidance.certified.plans import curves
 
@@ -79,6 +80,45 @@ def test_the_balls_hold_a_vehicle_that_keeps_its_velocity_after_the_growth(
     off = np.linalg.norm(flown - curves(centres, FINE + 1), axis=-1)
     assert (off <= radii[:, None] + 1e-9).all()
     assert np.ptp(radii[max(grown - 1, 0) :]) <= 1e-12
+
+
+@given(
+    seeds,
+    st.floats(0.0, 3.0),
+    st.floats(-2.0, 2.0),
+    st.sampled_from([0.1, 1.0, 4.0]),
+    st.sampled_from([DT * STEPS, 0.5]),
+)
+def test_the_balls_of_a_turn_hold_who_turns_and_deviates(
+    seed: int, age: float, rate: float, acceleration: float, growth: float
+) -> None:
+    """It turns at ``rate``, and accelerates in addition, up to the end of the growth."""
+    rng = np.random.default_rng(seed)
+    velocity = rng.normal(size=3)
+    centres, radii = reachable(np.zeros(3), velocity, age, SECONDS, 100.0, acceleration, growth, rate)
+    deviation = any_motion(rng, np.zeros(3), age, 100.0, acceleration)
+    grown = int(np.searchsorted(SECONDS, growth))
+    if grown < STEPS:
+        deviation[grown:] = deviation[grown, 0]
+    fine = age + np.add.outer(SECONDS[:-1], DT / FINE * np.arange(FINE + 1.0))
+    arc = turning_path(np.zeros(3), velocity, rate, fine.ravel()).positions.reshape(*fine.shape, 3)
+    off = np.linalg.norm(arc + deviation - curves(centres, FINE + 1), axis=-1)
+    assert (off <= radii[:, None] + 1e-9).all()
+
+
+def test_a_vehicle_that_turns_is_expected_on_the_circle() -> None:
+    velocity, centre = np.array([0.0, 3.0, 0.0]), np.array([-3.0, 0.0, 0.0])
+    centres, _ = reachable(np.zeros(3), velocity, 0.0, SECONDS, 3.0, 1e-3, turn_rate=1.0)
+    np.testing.assert_allclose(np.linalg.norm(centres[:, ::2] - centre, axis=-1), 3.0, atol=1e-9)
+
+
+def test_a_ball_about_the_last_position_moves_on_as_the_turn_does_after_the_growth() -> None:
+    velocity, grown = np.array([0.0, 3.0, 0.0]), 4
+    centres, radii = reachable(np.zeros(3), velocity, 0.0, SECONDS, 3.0, 100.0, SECONDS[grown], 1.0)
+    arc = turning_path(np.zeros(3), velocity, 1.0, SECONDS).positions
+    np.testing.assert_allclose(centres[1:grown], 0.0, atol=1e-12)
+    np.testing.assert_allclose(centres[grown:, 2], arc[grown + 1 :] - arc[grown], atol=1e-9)
+    assert radii[grown:] == pytest.approx(3.0 * SECONDS[grown], abs=0.01)
 
 
 @given(seeds, st.floats(0.0, 5.0))

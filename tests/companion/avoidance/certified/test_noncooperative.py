@@ -112,6 +112,36 @@ def test_balls_grow_for_the_configured_time_and_move_on(growth: int) -> None:
     np.testing.assert_allclose(went, np.tile(step * velocity, (STEPS - grown, 1)), atol=1e-3)
 
 
+@pytest.mark.parametrize("sigma", [0.0, 1.0])
+def test_a_vehicle_that_circles_is_expected_on_its_circle_if_its_turn_is_estimated(sigma: float) -> None:
+    given = config().model_dump(mode="json") | {"neighbour": {"sigma_velocity": 0.02, "sigma_turn": sigma}}
+    of = CompanionConfig.model_validate(given)
+    world, seeing = World(of, OWN, 10, FLEET), NonCooperative(of, STEPS)
+    radius, rate = 2.0, 0.5
+    for k in range(61):
+        ahead = np.array([np.cos(0.05 * k * rate), np.sin(0.05 * k * rate), 0.0])
+        aside = np.array([-ahead[1], ahead[0], 0.0])
+        latitude, longitude, altitude = FLEET.to_geodetic(HERE + radius * ahead)
+        east, north, _ = radius * rate * aside
+        message = GlobalPosition(
+            Source(OTHER, 1),
+            100_000_000 + 50_000 * k,
+            latitude,
+            longitude,
+            altitude,
+            0.0,
+            (north, east, 0.0),
+            None,
+        )
+        now = NOW + 50_000 * k
+        world.receive(now + of.neighbour.delay_us, "swarm", message)
+    (one,) = seeing.seen(now, frozenset(), world)
+    assert one.turn_rate == pytest.approx(rate if sigma else 0.0, abs=0.05)
+    ((centres, _),) = seeing.balls([one], np.tile(HERE + 50.0, (STEPS, 3, 1)))
+    off = np.abs(np.linalg.norm(centres[:10, 2] - HERE, axis=1) - radius)
+    assert (off.max() < 0.1) == bool(sigma)
+
+
 def test_a_target_that_falls_silent_is_kept_clear_of_where_it_was_last() -> None:
     of = config().model_copy(update={"target_d_min": 1.0, "target_d_safe": 4.0})
     world, place = World(of, OWN, OTHER, FLEET), HERE + np.array([3.0, 0.0, 0.0])
