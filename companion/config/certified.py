@@ -232,8 +232,8 @@ class CertifiedConfig(Settings):
         None,
         ge=0,
         le=60_000_000,
-        description="µs of a plan in which those that share no plan may change their velocity; afterwards"
-        " they are assumed to keep it; null: all of the plan",
+        description="µs of a plan in which those that share no plan may deviate from the received velocity;"
+        " afterwards they are assumed to have it; null: all of the plan",
     )
     omega_end: Positive = Field(30.0, description="weight of where the plan comes to rest")
     omega_place: Weight = Field(0.3, description="weight of where it is after each step before")

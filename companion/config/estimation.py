@@ -18,7 +18,11 @@ class TrackConfig(Settings):
     sigma_velocity: Positive = Field(0.05, description="m/s")
     sigma_acceleration: Positive = Field(2.0, description="m/s², of the constant-velocity model")
     sigma_turn: float = Field(
-        0.0, ge=0.0, le=10.0, description="rad/s, of the rates at which its course turns; 0: it goes straight"
+        0.0,
+        ge=0.0,
+        le=10.0,
+        description="rad/s, of the rates at which its course turns; 0: it goes straight; of neighbours it"
+        " counts only for those that share no plan, beside committed plans",
     )
     turn_memory_us: Micros = Field(
         3_000_000, description="µs: time constant with which the turn rate decays to 0"

@@ -37,7 +37,7 @@ class Announcements:
         self._turn = 0
 
     def begin(self) -> bool:
-        """Begin with another plan; return whether one was announced before, on which others rely."""
+        """Note that a new plan begins, which is unannounced; return whether the one before was announced."""
         announced, self._announced = self._announced, False
         return announced
 

@@ -49,7 +49,7 @@ class CertifiedFlight:
 
     def __init__(self, config: CompanionConfig, own: Source, fleet: FleetFrame) -> None:
         certified, steps = config.certified, config.horizon.steps + 1
-        self._config, self._own = config, own
+        self._config = config
         program = SeparationQp(
             steps, config.limits.within(config.field.margin(1)), certified, planar=config.planar
         )
@@ -98,7 +98,6 @@ class CertifiedFlight:
         self._lead = certified.epoch_us if config.tracking.compensate else certified.lead_us
         self._replies: list[Timesync] = []
         self._seconds: Array = 1e-6 * certified.dt_us * np.arange(1.0, steps + 1.0)
-        self._steps = steps
         self.tube = TubeWatch(config, self.commitment)
         self._goals = PlanGoals(
             config, own, self.agreements, obstacles, self._told, self._deadlock_turn, sense
@@ -389,5 +388,8 @@ class CertifiedFlight:
         return [*sync, *self._announcements.messages(now, self.tube.outside, farewell=farewell)]
 
     def recall(self) -> bool:
-        """Take back what the last ``messages`` announced, if they are not sent (``Announcements.recall``)."""
+        """Take back what the last ``messages`` announced; return whether that was possible.
+
+        Call it if these messages are not sent (``Announcements.recall``).
+        """
         return self._announcements.recall()

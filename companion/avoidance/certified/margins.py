@@ -18,7 +18,7 @@ from companion.estimation.turn_rate import turning_path
 from companion.values.horizon import Array
 
 _ARC = 1.0 / 24.0
-"""Largest distance of an arc from the quadratic curve with its ends, as a share of v ω² dt³."""
+"""Bound of the distance of an arc from the quadratic curve with its ends, as a share of v ω² dt³."""
 
 
 def fastest(limits: LimitsConfig) -> float:
@@ -91,13 +91,13 @@ def reachable(
     the control points of n segments, the radii those at the segments' ends. The vehicle was at ``position``
     (3,), m, with ``velocity`` (3,), m/s, ``age`` seconds before time 0 of ``seconds`` (n + 1,), the knots.
     Two balls hold it: one about its last position, one about the position at constant velocity; the smaller
-    one is returned. From the first knot at or after ``growth`` (s) on the vehicle is assumed to keep
-    ``velocity``: the ball keeps its radius and moves on. With a ``turn_rate`` (rad/s, counter-clockwise from
-    above) the velocity turns, and ``acceleration`` is what the vehicle does in addition.
+    one is returned. From the first knot at or after ``growth`` (s) on the vehicle is assumed to have
+    ``velocity`` again: the ball keeps its radius and moves on. With a ``turn_rate`` (rad/s, counter-clockwise
+    from above) the velocity turns, and ``acceleration`` bounds the rest of the vehicle's acceleration.
     """
     later = age + seconds
     begin, end = later[:-1], later[1:]
-    until = later[min(int(np.searchsorted(seconds, growth)), len(end))]
+    until = later[min(int(np.searchsorted(seconds, growth - 1e-9)), len(end))]
     bounded = np.minimum(end, until)
     stays, goes_on = speed * bounded, 0.5 * acceleration * bounded**2
     flies = goes_on < stays

@@ -73,9 +73,11 @@ class NonCooperative:
         """
         found = []
         neighbours = world.neighbours
-        received = *neighbours.last_received(members), *neighbours.as_arrived()
         rates = neighbours.turn_rates() if self._turns else {}
-        for system, time, position, velocity in received:
+        received = [(*one, rates.get(one[0], 0.0)) for one in neighbours.last_received(members)]
+        # The rate is that of the track, which such a message may not belong to.
+        received += [(*one, 0.0) for one in neighbours.as_arrived()]
+        for system, time, position, velocity, rate in received:
             if system not in members:
                 age = max(1e-6 * (begins - time), 0.0)
                 found.append(
@@ -84,7 +86,7 @@ class NonCooperative:
                         velocity,
                         age,
                         *self._moving_obstacles.get(system, (self._least_to_vehicle, False)),
-                        rates.get(system, 0.0),
+                        rate,
                     )
                 )
         return found
@@ -94,11 +96,11 @@ class NonCooperative:
 
         ``own`` (n, 3, 3), m, are the control points of the own plan.
         """
-        own_config = self._config.certified
-        growth = own_config.noncooperative_growth_us
+        certified = self._config.certified
+        growth = certified.noncooperative_growth_us
         bounds = (
-            own_config.noncooperative_speed,
-            own_config.noncooperative_acceleration,
+            certified.noncooperative_speed,
+            certified.noncooperative_acceleration,
             inf if growth is None else 1e-6 * growth,
         )
         found = []
@@ -131,8 +133,8 @@ class NonCooperative:
     def field(self, seen: list[NonCooperativeVehicle], own: Array, sensed: Axes | None = None) -> Array:
         """Return f (n, 3), m/s², after each step of the committed plan ``own`` (n, 3, 3): eqs. (9) and (10).
 
-        It is the field of the vehicles ``seen``, assumed to keep their velocity until they are near the plan,
-        and of the obstacles ``sensed`` near the plan's control points.
+        It is the field of the vehicles ``seen``, assumed to keep their velocity, or to turn on, until they
+        are near the plan, and of the obstacles ``sensed`` near the plan's control points.
         """
         config = self._config
         if sensed is None:

@@ -25,7 +25,7 @@ _ROUNDING_M = 1e-6
 class Places:
     """Chooses where plans of the vehicle ``own`` (system id) end.
 
-    ``obstacles``: what constrains them; ``told``: goals of the others.
+    ``obstacles``: what is fixed or rests there; ``told``: goals of the others.
     """
 
     def __init__(self, config: CompanionConfig, own: int, told: ToldGoals, obstacles: WayObstacles) -> None:

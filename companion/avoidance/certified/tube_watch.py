@@ -10,7 +10,7 @@ from companion.values.horizon import Motion
 
 
 class TubeWatch:
-    """Tube of one vehicle: ``tube`` around a plan in space, ``tube`` or ``drift`` around a column."""
+    """Tube of one vehicle: ``tube`` around a plan in space; around a column ``drift``, if it is larger."""
 
     def __init__(self, config: CompanionConfig, commitment: Commitment) -> None:
         self._tube = config.certified.tube

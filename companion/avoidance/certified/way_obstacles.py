@@ -1,7 +1,7 @@
 """Obstacles of ways and goals: fixed ones, and vehicles that rest or have landed.
 
-Seen from above they are discs and rectangles, in space balls. Plans keep clear of more
-(``ConstraintSources``): of all that moves.
+Seen from above they are discs and rectangles, in space balls. Plans keep clear of what moves, too
+(``ConstraintSources``).
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ class WayObstacles:
         self.between = departed.between
         """Least distance (m) between two plans."""
         self.from_last = departed.from_last
+        """See ``DepartedVehicles.from_last``."""
         self._from_surfaces = from_surfaces(config.certified, config.field, config.limits)
         self._round = [one for one in config.obstacles if isinstance(one, Post | Sphere)]
         self._posts = FixedObstacles([one for one in self._round if isinstance(one, Post)])

@@ -62,7 +62,7 @@ def test_the_balls_hold_every_motion_within_the_bounds(
     st.sampled_from([0.1, 1.0, 4.0]),
     st.floats(0.0, DT * STEPS),
 )
-def test_the_balls_hold_a_vehicle_that_keeps_its_velocity_after_the_growth(
+def test_the_balls_hold_a_vehicle_that_has_the_received_velocity_after_the_growth(
     seed: int, age: float, speed: float, acceleration: float, growth: float
 ) -> None:
     """Up to ``growth`` it moves anyhow within the bounds, from the next knot on as it was received."""
@@ -70,7 +70,7 @@ def test_the_balls_hold_a_vehicle_that_keeps_its_velocity_after_the_growth(
     direction = rng.normal(size=3)
     velocity = rng.uniform() ** 0.3 * speed * direction / np.linalg.norm(direction)
     centres, radii = reachable(np.zeros(3), velocity, age, SECONDS, speed, acceleration, growth)
-    grown = int(np.searchsorted(SECONDS, growth))
+    grown = int(np.searchsorted(SECONDS, growth - 1e-9))
     flown = any_motion(rng, velocity, age, speed, acceleration)
     later = DT / FINE * np.arange((STEPS - grown) * FINE + 1.0)
     begun = flown[grown, 0] if grown < STEPS else flown[-1, -1]
@@ -97,7 +97,7 @@ def test_the_balls_of_a_turn_hold_who_turns_and_deviates(
     velocity = rng.normal(size=3)
     centres, radii = reachable(np.zeros(3), velocity, age, SECONDS, 100.0, acceleration, growth, rate)
     deviation = any_motion(rng, np.zeros(3), age, 100.0, acceleration)
-    grown = int(np.searchsorted(SECONDS, growth))
+    grown = int(np.searchsorted(SECONDS, growth - 1e-9))
     if grown < STEPS:
         deviation[grown:] = deviation[grown, 0]
     fine = age + np.add.outer(SECONDS[:-1], DT / FINE * np.arange(FINE + 1.0))
@@ -117,6 +117,7 @@ def test_a_ball_about_the_last_position_moves_on_as_the_turn_does_after_the_grow
     centres, radii = reachable(np.zeros(3), velocity, 0.0, SECONDS, 3.0, 100.0, SECONDS[grown], 1.0)
     arc = turning_path(np.zeros(3), velocity, 1.0, SECONDS).positions
     np.testing.assert_allclose(centres[1:grown], 0.0, atol=1e-12)
+    assert (np.linalg.norm(arc[1 : grown + 1], axis=1) <= radii[:grown]).all()
     np.testing.assert_allclose(centres[grown:, 2], arc[grown + 1 :] - arc[grown], atol=1e-9)
     assert radii[grown:] == pytest.approx(3.0 * SECONDS[grown], abs=0.01)
 

@@ -95,10 +95,12 @@ def test_a_thing_is_where_it_says_and_a_vehicle_only_nearly() -> None:
     assert np.isclose(least[1], 0.5 + 2.0 * (own.tube + clock) + np.sqrt(2.0) * sigma)
 
 
+@pytest.mark.parametrize("acceleration", [1.0, 500.0])
 @pytest.mark.parametrize("growth", [0, 500_000, 1_100_000])
-def test_balls_grow_for_the_configured_time_and_move_on(growth: int) -> None:
-    """Afterwards they keep their radius and have the received velocity."""
-    of, velocity = config(noncooperative_growth_us=growth), np.array([0.0, 2.0, 0.0])
+def test_balls_grow_for_the_configured_time_and_move_on(growth: int, acceleration: float) -> None:
+    """Afterwards they keep their radius and have the received velocity, also the balls about a place."""
+    velocity = np.array([0.0, 2.0, 0.0])
+    of = config(noncooperative_growth_us=growth, noncooperative_acceleration=acceleration)
     world = World(of, OWN, 10, FLEET)
     announced(world, HERE + np.array([50.0, 0.0, 0.0]), velocity)
     seeing, own = NonCooperative(of, STEPS), np.tile(HERE, (STEPS, 3, 1))
