@@ -41,17 +41,14 @@ class Announcements:
         announced, self._announced = self._announced, False
         return announced
 
-    def messages(self, now: int, outside: float, *, farewell: bool) -> list[Message]:
-        """Return the newest plan with a statement of all agreements, or a statement of those that changed.
+    def messages(self, now: int, announced: WirePlan, outside: float, *, farewell: bool) -> list[Message]:
+        """Return the plan ``announced`` with a statement of all agreements, or one of those that changed.
 
         The plan is due at once and then every ``repeat_us``, or more often in heavy loss (``Repetition``).
         ``outside`` (m): how far the vehicle is outside its tube. ``farewell``: the vehicle makes no further
         plan, and the statement says so.
         """
         self._unsent = None
-        announced = self._commitment.announced()
-        if announced is None:
-            return []
         new = announced.epoch != self._commitment.announced_until
         if not new and now < self.next_at:
             return [] if farewell else self._statements(announced.epoch, outside, every=False)

@@ -12,14 +12,13 @@ import numpy as np
 from companion.avoidance.certified.agreed_planes import stacked
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.departed import DepartedVehicles
-from companion.avoidance.certified.margins import between, fastest, from_surfaces, margin
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
+from companion.avoidance.certified.margins import fastest, margin
 from companion.avoidance.certified.noncooperative import NonCooperative
 from companion.avoidance.certified.separating_planes import Others
 from companion.config import CompanionConfig
-from companion.config.obstacles import Post, Sphere
-from companion.obstacles.boxes import boxes_of
-from companion.obstacles.static import Axes, FixedObstacles
-from companion.values.boxes import Boxes, BoxIndex
+from companion.obstacles.static import Axes
+from companion.values.boxes import Boxes
 from companion.values.horizon import Array
 from companion.world import View, World
 
@@ -30,19 +29,14 @@ _SIGHT_MARGIN_M = 1.0
 class ConstraintSources:
     """Constraint sources of one vehicle; ``around`` gives those of each plan."""
 
-    def __init__(self, config: CompanionConfig, steps: int) -> None:
+    def __init__(self, config: CompanionConfig, steps: int, fixed: FixedSurfaces) -> None:
         self._config, self._steps = config, steps
         own = config.certified
-        self.between = between(own, config.field, config.limits)
+        self._departed = DepartedVehicles(config)
+        self.between = self._departed.between
         """Least distance (m) between two plans."""
         self._margin = margin(own, config.field, config.limits)
-        self._from_surfaces = from_surfaces(own, config.field, config.limits)
-        """Least distance (m) of a plan from a surface."""
-        self._departed = DepartedVehicles(config)
-        self._round = [one for one in config.obstacles if isinstance(one, Post | Sphere)]
-        self._posts = FixedObstacles([one for one in self._round if isinstance(one, Post)])
-        self._balls = FixedObstacles([one for one in self._round if isinstance(one, Sphere)])
-        self._boxes = BoxIndex(boxes_of(config.obstacles))
+        self._fixed, self._from_surfaces = fixed, fixed.least
         self._noncooperative = NonCooperative(config, steps)
         none = np.empty((0, steps, 3, 3))
         self._nothing = none, none, np.empty((0, steps)), np.empty(0)
@@ -137,10 +131,10 @@ class ConstraintSources:
         So posts act as if they had no top.
         """
         found: list[tuple[Array, float]] = []
-        if not self._round:
+        if not self._fixed.round:
             return found
         points = own.reshape(-1, 3)
-        for fixed, upright in ((self._balls, False), (self._posts, True)):
+        for fixed, upright in ((self._fixed.balls, False), (self._fixed.posts, True)):
             if not len(fixed):
                 continue
             _, positions, radii = fixed.around(points, self._sight)
@@ -156,11 +150,12 @@ class ConstraintSources:
 
         In a plane of fixed height those far above or below it are left out.
         """
-        if not len(self._boxes.boxes.centres):
+        boxes = self._fixed.boxes
+        if not len(boxes.boxes.centres):
             return None
         points = own.reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
-        found = self._boxes.boxes.chosen(self._boxes.near(low[:2] - self._sight, high[:2] + self._sight))
+        found = boxes.boxes.chosen(boxes.near(low[:2] - self._sight, high[:2] + self._sight))
         if not self._config.planar:
             return found
         above = np.abs(found.centres[:, 2] - 0.5 * (low[2] + high[2])) - found.halves[:, 2]

@@ -15,6 +15,7 @@ from companion.avoidance.certified.committed import controls, rest_time
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.deadlock import DeadlockTurn
 from companion.avoidance.certified.fingerprint import identity
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.margins import beside, further
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.peer_plans import StoredPlan
@@ -66,9 +67,10 @@ class CertifiedFlight:
         self._vicinity = None if certified.range is None else Vicinity(config)
         self._listens_since: int | None = None
         self._last_step = 0
-        self._sources = ConstraintSources(config, steps)
+        fixed = FixedSurfaces(config)
+        self._sources = ConstraintSources(config, steps, fixed)
         self._told = ToldGoals(own, fleet.fingerprint)
-        obstacles = WayObstacles(config)
+        obstacles = WayObstacles(config, fixed)
         self._places = Places(config, own.system, self._told, obstacles)
         downwash, between = config.field.downwash, self._sources.between
         distances = Distances(
@@ -382,10 +384,11 @@ class CertifiedFlight:
             farewell = self.commitment.following is None
         elif self._polled_at != now:
             self._in_control = False
-        if self.commitment.announced() is None or not (self._in_control or farewell):
+        announced = self.commitment.announced()
+        if announced is None or not (self._in_control or farewell):
             return [*sync, *self._announcements.away(now)]
         self._agree(now)
-        return [*sync, *self._announcements.messages(now, self.tube.outside, farewell=farewell)]
+        return [*sync, *self._announcements.messages(now, announced, self.tube.outside, farewell=farewell)]
 
     def recall(self) -> bool:
         """Take back what the last ``messages`` announced; return whether that was possible.

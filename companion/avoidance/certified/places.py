@@ -84,7 +84,7 @@ class Places:
             return np.asarray(inside)
         if self._config.planar:
             places = np.column_stack([places[:, :2], np.broadcast_to(ends[..., 2], len(places))])
-        return np.asarray(inside & self._obstacles.clear_of_fixed(places))
+        return np.asarray(inside & self._obstacles.fixed.clear(places))
 
     def _beside_goal(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
         """Return ``goal`` (3,), m, or the nearest free place if a vehicle that said farewell covers it.

@@ -10,17 +10,13 @@ from collections.abc import Sequence
 from math import hypot, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.departed import DepartedVehicles
-from companion.avoidance.certified.margins import from_surfaces
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.visibility_graph import Discs, Rectangles, rectangles
 from companion.config import CompanionConfig
-from companion.config.obstacles import Post, Sphere
-from companion.obstacles.boxes import boxes_of
-from companion.obstacles.static import FixedObstacles
-from companion.values.boxes import BoxIndex, distances
+from companion.config.obstacles import Post
 from companion.values.horizon import Array
 from companion.ways.balls import Balls
 
@@ -38,31 +34,14 @@ _AROUND_M, _MOST_BOXES = 20.0, 8
 class WayObstacles:
     """Obstacles of one vehicle's ways."""
 
-    def __init__(self, config: CompanionConfig) -> None:
+    def __init__(self, config: CompanionConfig, fixed: FixedSurfaces) -> None:
         self._config = config
+        self.fixed = fixed
         self._departed = departed = DepartedVehicles(config)
         self.between = departed.between
         """Least distance (m) between two plans."""
         self.from_last = departed.from_last
         """See ``DepartedVehicles.from_last``."""
-        self._from_surfaces = from_surfaces(config.certified, config.field, config.limits)
-        self._round = [one for one in config.obstacles if isinstance(one, Post | Sphere)]
-        self._posts = FixedObstacles([one for one in self._round if isinstance(one, Post)])
-        self._balls = FixedObstacles([one for one in self._round if isinstance(one, Sphere)])
-        self._boxes = BoxIndex(boxes_of(config.obstacles))
-
-    def clear_of_fixed(self, places: Array) -> NDArray[np.bool_]:
-        """Return whether ``places`` (n, 3), m, are as far from all fixed obstacles as plans keep, (n,).
-
-        Posts act as if they had no top.
-        """
-        least = self._from_surfaces
-        clear = (self._balls.distance(places) >= least).all(axis=1)
-        below = places.copy()
-        below[:, 2] = -np.inf
-        clear &= (self._posts.distance(below) >= least).all(axis=1)
-        clear &= (distances(places, self._boxes.boxes) >= least).all(axis=1)
-        return np.asarray(clear)
 
     def resting(
         self, epoch: int, here: Array, there: Array, agreements: Agreements, goals: Sequence[Array] = ()
@@ -75,9 +54,9 @@ class WayObstacles:
         """
         low, high = min(here[2], there[2]), max(here[2], there[2])
         fixed = []
-        for one in self._round:
+        for one in self.fixed.round:
             above = 0.0 if isinstance(one, Post) else max(one.at[2] - high, low - one.at[2], 0.0)
-            fixed.append((one.at[:2], self._from_surfaces + one.radius, above))
+            fixed.append((one.at[:2], self.fixed.least + one.radius, above))
         landed = [
             (tuple(last.controls[-1, 2, :2]), self.from_last(last), 0.0) for last in agreements.left.values()
         ]
@@ -112,7 +91,7 @@ class WayObstacles:
             places.append(end)
             kept.append(self.between)
             flat.append(0.0 if level else 1.0 / self._config.field.downwash)
-        radii = np.array(kept) - self._from_surfaces
+        radii = np.array(kept) - self.fixed.least
         return Balls(np.array(places).reshape(-1, 3), radii, np.array(flat))
 
     def occupied(self, epoch: int, goal: Array, agreements: Agreements) -> bool:
@@ -136,12 +115,12 @@ class WayObstacles:
         the square of their number, and a way around those is good for the next metres.
         """
         low, high = np.minimum(here, there), np.maximum(here, there)
-        rows = self._boxes.near(low[:2] - _AROUND_M, high[:2] + _AROUND_M)
-        boxes = self._boxes.boxes.chosen(rows)
+        rows = self.fixed.boxes.near(low[:2] - _AROUND_M, high[:2] + _AROUND_M)
+        boxes = self.fixed.boxes.boxes.chosen(rows)
         above = np.maximum(boxes.centres[:, 2] - high[2], low[2] - boxes.centres[:, 2]) - boxes.halves[:, 2]
         above = np.maximum(above, 0.0)
-        keep = np.flatnonzero(above < self._from_surfaces)
-        radii = np.sqrt(self._from_surfaces**2 - above[keep] ** 2) + BESIDE_M
+        keep = np.flatnonzero(above < self.fixed.least)
+        radii = np.sqrt(self.fixed.least**2 - above[keep] ** 2) + BESIDE_M
         found = rectangles(boxes.chosen(keep), radii)
         # No way leads out of a rectangle; a vehicle above or below a box may leave: planes keep it off.
         beside = (found.distance(np.stack([here[:2], there[:2]])) > 0.0).all(axis=0)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from companion.avoidance.certified.committed import controls
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.separating_planes import hull_distance
 from companion.avoidance.certified.way_obstacles import WayObstacles
 from companion.config import CompanionConfig
@@ -234,7 +235,7 @@ def test_heights_of_landed_vehicles_and_columns_do_not_count_as_those_of_others_
         config = CompanionConfig.model_validate(
             {"avoidance": "certified", "planar": planar, "field": {"downwash": 2.0}}
         )
-        obstacles = WayObstacles(config)
+        obstacles = WayObstacles(config, FixedSurfaces(config))
         found = obstacles.at_rest(0, agreements)
         assert (found.centres == [[0.5, 0.5, 0.5], ends[2], ends[3]]).all()
         assert found.flat.tolist() == flat

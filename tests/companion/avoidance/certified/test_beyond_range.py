@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.constraint_sources import ConstraintSources
 from companion.avoidance.certified.fingerprint import FleetIdentity
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.negotiation import Geometry
 from companion.avoidance.certified.peer_plans import StoredPlan, stored
 from companion.config import CompanionConfig
@@ -61,7 +62,7 @@ class Here:
         )
         self.agreements.begin(EPOCH)
         self.agreements.made(plan(x=x))
-        self._sources = ConstraintSources(self.config, STEPS)
+        self._sources = ConstraintSources(self.config, STEPS, FixedSurfaces(self.config))
 
     def _beyond(self, _now: int, one: StoredPlan) -> bool:
         return abs(float(one.controls[0, 0, 0]) - self.x) >= 20.0

@@ -10,6 +10,7 @@ import pytest
 
 from companion.avoidance.certified.committed import resting as at_rest
 from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.peer_plans import stored
 from companion.avoidance.certified.places import Places
 from companion.avoidance.certified.plan_goals import PlanGoals
@@ -34,7 +35,7 @@ class Beside:
     def __init__(self, *, planar: bool) -> None:
         config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
         self.told = ToldGoals(Source(1, 1), 7)
-        obstacles = WayObstacles(config)
+        obstacles = WayObstacles(config, FixedSurfaces(config))
         self.d = obstacles.between
         self._places = Places(config, 1, self.told, obstacles)
         landed = {9: stored(at_rest(EPOCH, DT, STEPS, ORIGIN, 7))}
@@ -83,7 +84,7 @@ def told(
     """
     document = {"avoidance": "certified", "planar": planar, "limits": limits}
     config = CompanionConfig.model_validate(document)
-    obstacles, goals_told = WayObstacles(config), ToldGoals(Source(1, 1), 7)
+    obstacles, goals_told = WayObstacles(config, FixedSurfaces(config)), ToldGoals(Source(1, 1), 7)
     rest = ORIGIN - 0.6 * obstacles.between * EAST
     agreements: Any = SimpleNamespace(
         left={9: stored(at_rest(EPOCH, DT, STEPS, landed, 7))},
@@ -142,7 +143,7 @@ class Asking:
 
     def __init__(self) -> None:
         config = CompanionConfig.model_validate({"avoidance": "certified", "planar": True})
-        obstacles = WayObstacles(config)
+        obstacles = WayObstacles(config, FixedSurfaces(config))
         self.d = obstacles.between
         self._room = Room(config, 1, ToldGoals(Source(1, 1), 7), obstacles)
 

@@ -11,6 +11,7 @@ import pytest
 
 from companion.avoidance.certified import detour as module
 from companion.avoidance.certified.detour import Detour, Subgoal
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.room import Room
 from companion.avoidance.certified.visibility_graph import Discs, Rectangles, finding, free
 from companion.avoidance.certified.way_obstacles import WayObstacles
@@ -348,7 +349,7 @@ def test_a_box_below_an_end_leaves_the_ways_around_the_rest(turned: bool) -> Non
     here, there = ends[::-1] if turned else ends
     config = CompanionConfig.model_validate({"avoidance": "certified", "obstacles": [box, post]})
     none: Any = SimpleNamespace(left={}, columns=(), resting=lambda *_: {})
-    (discs, _) = WayObstacles(config).resting(0, here, there, none)
+    (discs, _) = WayObstacles(config, FixedSurfaces(config)).resting(0, here, there, none)
     found = way(here[:2], there[:2], discs, *np.array([[-50.0, -50.0], [50.0, 50.0]]))
     assert found is not None
     assert np.abs(found[:, 1]).max() > 1.0

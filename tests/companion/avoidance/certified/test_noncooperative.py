@@ -34,12 +34,14 @@ def config(kind: str | None = None, **certified: float) -> CompanionConfig:
     )
 
 
-def announced(world: World, place: Array, velocity: Array, link: str = "swarm") -> None:
-    """The other says where it is, and how fast."""
+def announced(
+    world: World, place: Array, velocity: Array, link: str = "swarm", now: int = NOW, stamp: int = NOW // 1000
+) -> None:
+    """The other says where it is, and how fast; that arrives at ``now`` (µs) with ``stamp`` (µs)."""
     latitude, longitude, altitude = FLEET.to_geodetic(place)
     ned = (float(velocity[1]), float(velocity[0]), float(-velocity[2]))
-    message = GlobalPosition(Source(OTHER, 1), NOW // 1000, latitude, longitude, altitude, 0.0, ned, None)
-    world.receive(NOW, link, message)
+    message = GlobalPosition(Source(OTHER, 1), stamp, latitude, longitude, altitude, 0.0, ned, None)
+    world.receive(now, link, message)
 
 
 def hovering(of: CompanionConfig, place: Array, velocity: Array) -> Array:
@@ -123,20 +125,9 @@ def test_a_vehicle_that_circles_is_expected_on_its_circle_if_its_turn_is_estimat
     for k in range(61):
         ahead = np.array([np.cos(0.05 * k * rate), np.sin(0.05 * k * rate), 0.0])
         aside = np.array([-ahead[1], ahead[0], 0.0])
-        latitude, longitude, altitude = FLEET.to_geodetic(HERE + radius * ahead)
-        east, north, _ = radius * rate * aside
-        message = GlobalPosition(
-            Source(OTHER, 1),
-            100_000_000 + 50_000 * k,
-            latitude,
-            longitude,
-            altitude,
-            0.0,
-            (north, east, 0.0),
-            None,
-        )
         now = NOW + 50_000 * k
-        world.receive(now + of.neighbour.delay_us, "swarm", message)
+        sent = {"now": now + of.neighbour.delay_us, "stamp": 100_000_000 + 50_000 * k}
+        announced(world, HERE + radius * ahead, radius * rate * aside, **sent)
     (one,) = seeing.seen(now, frozenset(), world)
     assert one.turn_rate == pytest.approx(rate if sigma else 0.0, abs=0.05)
     ((centres, _),) = seeing.balls([one], np.tile(HERE + 50.0, (STEPS, 3, 1)))
@@ -200,12 +191,9 @@ def test_the_balls_hold_a_vehicle_whose_clock_begins_anew(jump: float, turn: flo
 
     for k in range(20 * hz):
         place, velocity = true(k / hz)
-        latitude, longitude, altitude = FLEET.to_geodetic(place)
-        ned = (float(velocity[1]), float(velocity[0]), float(-velocity[2]))
         sent = round(1e6 * k / hz)
         stamp = 100_000_000 + sent - (round(1e6 * jump) if k >= 10 * hz else 0)
-        message = GlobalPosition(Source(OTHER, 1), stamp, latitude, longitude, altitude, 0.0, ned, None)
-        world.receive(NOW + sent + delay, "swarm", message)
+        announced(world, place, velocity, now=NOW + sent + delay, stamp=stamp)
         for later in (0, round(4e5 / hz)):
             now = NOW + sent + delay + later
             apart = []

@@ -11,6 +11,7 @@ import pytest
 
 from companion.avoidance.certified.committed import resting
 from companion.avoidance.certified.constraint_sources import ConstraintSources
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.peer_plans import stored
 from companion.config import CompanionConfig
 from companion.values.horizon import Array
@@ -49,7 +50,7 @@ def away(height: float, aside: float, *, planar: bool = False, column: bool = Fa
     It rests ``height`` and ``aside`` (least distances) to the south of it, with a goal in the east.
     """
     config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
-    sources = ConstraintSources(config, STEPS)
+    sources = ConstraintSources(config, STEPS, FixedSurfaces(config))
     last = resting(EPOCH, DT, STEPS, BELOW, 7, column=column)
     rest = BELOW + sources.between * np.array([0.0, -aside, height])
     own, goal = np.tile(rest, (STEPS, 3, 1)), rest + np.array([20.0, 0.0, 0.0])

@@ -10,6 +10,7 @@ import pytest
 
 from companion.avoidance.certified.committed import resting as at_rest
 from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.plan_goals import PlanGoals
 from companion.avoidance.certified.told_goals import ToldGoals
 from companion.avoidance.certified.way_obstacles import WayObstacles
@@ -28,7 +29,7 @@ def test_a_way_through_gaps_that_open_and_close_is_no_progress() -> None:
     """With each new way at the same place progress began anew, so the vehicle never counted as stalled."""
     limits = {"box_min": (-6.0, -4.7, 0.5), "box_max": (6.0, 4.7, 2.0), "v_max": (1.0, 1.0, 0.5)}
     config = CompanionConfig.model_validate({"avoidance": "certified", "limits": limits})
-    plans, obstacles = 0, WayObstacles(config)
+    plans, obstacles = 0, WayObstacles(config, FixedSurfaces(config))
     d = obstacles.between
 
     def resting(_since: int, _still: float) -> dict[int, Any]:
@@ -60,7 +61,7 @@ def least_angle(blocking: dict[int, Any], *, planar: bool) -> float:
     ``blocking``: vehicles that rest, at their places (3,), m; its goal is 9 m to the east of the origin.
     """
     config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
-    obstacles = WayObstacles(config)
+    obstacles = WayObstacles(config, FixedSurfaces(config))
     others: dict[str, Any] = {"left": {}, "columns": (), "newest": dict, "age": lambda *_: 0.0}
     agreements: Any = SimpleNamespace(**others, resting=lambda *_: blocking, ends=lambda: blocking)
     turn = DeadlockTurn(DeadlockConfig(), 1.0)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.room import Room
 from companion.avoidance.certified.told_goals import ToldGoals
 from companion.avoidance.certified.way_obstacles import WayObstacles
@@ -88,7 +89,7 @@ class Standing:
         self.config = CompanionConfig.model_validate(document)
         self.here = here
         self.told = ToldGoals(Source(own, 1), 7)
-        self.obstacles = WayObstacles(self.config)
+        self.obstacles = WayObstacles(self.config, FixedSurfaces(self.config))
         self.room = Room(self.config, own, self.told, self.obstacles)
         self.d = self.obstacles.between
         self._others = {100 + k: place for k, place in enumerate([] if others is None else others)}

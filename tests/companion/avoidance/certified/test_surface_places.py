@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
 from companion.avoidance.certified.margins import between, from_surfaces
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.avoidance.certified.places import Places
@@ -117,7 +118,9 @@ def assigned(config: CompanionConfig, ends: dict[int, Array]) -> dict[int, Array
     for own, end in ends.items():
         surface = config.surface_of(own)
         aim = Aim(AT + surface.nearest(end - AT), np.zeros(3), AT, AT, surface)
-        places = Places(config, own, ToldGoals(Source(own, 1), 7), WayObstacles(config))
+        places = Places(
+            config, own, ToldGoals(Source(own, 1), 7), WayObstacles(config, FixedSurfaces(config))
+        )
         others: Any = Ends({system: place for system, place in ends.items() if system != own})
         found[own] = places.destination(0, 0, end, aim, others)
     return found
