@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from companion.avoidance.certified import constraint_sources, negotiation
+from companion.avoidance.certified import departed, negotiation
 from companion.avoidance.certified.agreed_planes import AgreedPlanes, made
 from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.margins import between
@@ -111,7 +111,7 @@ def errors_of_one_side(patch: pytest.MonkeyPatch) -> None:
         surplus = (2.0 - sqrt(2.0)) * certified.sigmas * field.position_sigma
         return between(certified, field, limits) - surplus
 
-    patch.setattr(constraint_sources, "between", independent)
+    patch.setattr(departed, "between", independent)
 
 
 @pytest.mark.slow
