@@ -112,11 +112,15 @@ class Agreements:
             self.refused += 1
 
     def _place(self, now: int, peer: Peer) -> None:
-        """Count a ``peer`` that was heard, unless its newest plan shows that it is beyond the range."""
+        """Count a ``peer`` that was heard, unless its plans show that it is beyond the range.
+
+        They are the one that it flies now, if it was received, and its newest one.
+        """
         if self._beyond is None:
             return
-        system, plan = peer.pair.peer, peer.plans.newest
-        if plan is not None and self._beyond(now, plan):
+        system, newest = peer.pair.peer, peer.plans.newest
+        flown = peer.plans.before(now)
+        if any(plan is not None and self._beyond(now, plan) for plan in (flown, newest)):
             if system in self._peers:
                 peer.part()
                 self._distant[system] = self._peers.pop(system)

@@ -34,18 +34,36 @@ class Vicinity:
     def beyond(self, now: int, place: Array, plan: StoredPlan) -> bool:
         """Return whether a vehicle with ``plan`` is certainly beyond the range at ``now`` (µs).
 
-        ``place`` (3,), m: where the own plan is then. The vehicle was, or will be, where its plan is at the
-        beginning and at the end of the plan's epoch, and flies no faster than plans may.
+        ``place`` (3,), m: where the own plan is then. The vehicle flies its plan in the plan's epoch. Before
+        and after, it flies no faster than plans may, to where that epoch begins and from where it ends.
         """
-        begins, length = plan.plan.epoch, self._knots * plan.plan.dt
-        for time, there in (
-            (begins, plan.controls[0, 0]),
-            (begins + length, plan.rested[self._knots - 1, 2]),
-        ):
-            apart = hypot(place[0] - there[0], place[1] - there[1])
-            if apart - 1e-6 * abs(now - time) * self._speed > self._beyond:
-                return True
-        return False
+        begins = plan.plan.epoch
+        ends = begins + self._knots * plan.plan.dt
+        if begins <= now < ends:
+            # Exact, so that two vehicles at rest agree on it at all times. With a bound from the ends of the
+            # epoch they would part at these and meet in the middle, and never have an agreement.
+            return _apart(place, _position(plan, now)) > self._beyond
+        return any(
+            _apart(place, there) - 1e-6 * abs(now - time) * self._speed > self._beyond
+            for time, there in (
+                (begins, plan.controls[0, 0]),
+                (ends, plan.rested[self._knots - 1, 2]),
+            )
+        )
+
+
+def _apart(place: Array, there: Array) -> float:
+    """Return the horizontal distance (m) of two places."""
+    return hypot(place[0] - there[0], place[1] - there[1])
+
+
+def _position(plan: StoredPlan, now: int) -> Array:
+    """Return where ``plan`` is (3,), m, at ``now`` (µs), which is in its epoch."""
+    knot, rest = divmod(now - plan.plan.epoch, plan.plan.dt)
+    share = rest / plan.plan.dt
+    first, middle, last = plan.rested[knot]
+    found: Array = (1.0 - share) ** 2 * first + 2.0 * share * (1.0 - share) * middle + share**2 * last
+    return found
 
 
 def region(own: Array, towards: Array, sides: Array) -> Array:

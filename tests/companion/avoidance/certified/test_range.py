@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.avoidance.certified.agreements import Agreements
-from companion.avoidance.certified.committed import carried_on, controls
+from companion.avoidance.certified.committed import carried_on, controls, horizon_of
 from companion.avoidance.certified.fingerprint import FleetIdentity
 from companion.avoidance.certified.margins import between, fastest, further, sideways
 from companion.avoidance.certified.negotiation import Geometry
@@ -137,6 +137,11 @@ def test_who_seems_beyond_is_beyond_however_old_the_plan_is(seed: int, later: in
     now, place = EPOCH + later, rng.uniform(-12, 12, 3)
     if not vicinity.beyond(now, place, theirs):
         return
+    margins = 2.0 * sideways(of.certified, of.field, of.limits)
+    if 0 <= later < LENGTH:
+        flown = horizon_of(theirs.plan).at(now).position
+        assert np.linalg.norm((flown - place)[:2]) > RANGE + margins
+        return
     ends = theirs.controls[0, 0], theirs.controls[0, 2]
     since = [1e-6 * abs(later - at) * speed for at in (0, LENGTH)]
     steps = rng.normal(size=(1000, 3))
@@ -144,8 +149,24 @@ def test_who_seems_beyond_is_beyond_however_old_the_plan_is(seed: int, later: in
     nearest = int(np.argmin(since))
     there = ends[nearest] + since[nearest] * steps
     possible = there[np.linalg.norm(there - ends[1 - nearest], axis=1) <= since[1 - nearest]]
-    margins = 2.0 * sideways(of.certified, of.field, of.limits)
     assert (np.linalg.norm((possible - place)[:, :2], axis=1) > RANGE + margins).all()
+
+
+@given(seeds, st.integers(0, LENGTH - 1))
+@settings(max_examples=40, deadline=None)
+def test_in_the_epoch_of_a_plan_it_is_known_who_is_beyond(seed: int, later: int) -> None:
+    """However near the limit: there is no distance at which it depends on the time."""
+    rng = np.random.default_rng(seed)
+    of = config()
+    theirs = stored(random_plan(rng, rng.uniform(-12, 12, 3), speed=0.8))
+    now = EPOCH + later
+    flown = horizon_of(theirs.plan).at(now).position
+    limit = RANGE + 2.0 * sideways(of.certified, of.field, of.limits)
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    way = np.array([np.cos(angle), np.sin(angle), 0.0])
+    vicinity = Vicinity(of)
+    assert vicinity.beyond(now, flown + (limit + EXACT) * way, theirs)
+    assert not vicinity.beyond(now, flown + (limit - EXACT) * way, theirs)
 
 
 def limited(far: float = 10.0) -> Agreements:
@@ -256,6 +277,24 @@ def test_four_that_meet_in_two_lines_turn_back_and_arrive() -> None:
     assert swarm.least() >= swarm.d - EXACT
     ends = [vehicle.flight.commitment.own()[-1, 2] for vehicle in swarm.vehicles]
     np.testing.assert_allclose(ends, goals, atol=0.1)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.3])
+def test_who_rests_about_as_far_as_the_range_is_not_waited_for(loss: float) -> None:
+    """Of each pair that stands a little beyond the limit, both fly to their goals, which are 1 m aside."""
+    limit = RANGE + 2.0 * sideways(config().certified, config().field, config().limits)
+    # Plans are made in the middle of an epoch, as far from its ends as possible.
+    early = {**FLOWN, "lead_us": DT // 2, "last_call_us": DT // 2}
+    for more in np.linspace(-0.02, 0.4, 8):
+        starts = np.array([[0.0, 0.0, 5.0], [limit + more, 0.0, 5.0]])
+        goals = starts + np.array([0.0, 1.0, 0.0])
+        rough = Rough(loss, 60_000, reach=RANGE + 2.0)
+        swarm = Swarm(
+            starts, rough, [Habits()] * 2, 1, strangers=True, planar=True, settings=early, v_max=V_MAX
+        )
+        swarm.run(5_000_000, lambda _since, system, goals=goals: goals[system - 1])
+        ends = [vehicle.flight.commitment.own()[-1, 2] for vehicle in swarm.vehicles]
+        np.testing.assert_allclose(ends, goals, atol=0.05)
 
 
 LOW = {**FLOWN, "range": 4.0}
