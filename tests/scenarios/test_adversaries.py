@@ -26,7 +26,7 @@ FLIGHTS = [
     *[(flavour, flavour, response) for flavour in ("ardupilot", "px4") for response in ("exact", "firmware")],
 ]
 LEVEL = np.array([1.0, 1.0, 0.0])
-SEEDS = [pytest.param(seed, marks=pytest.mark.slow if seed > 2 else ()) for seed in range(1, 21)]
+SEEDS = [pytest.param(seed, marks=pytest.mark.soak if seed > 8 else ()) for seed in range(1, 21)]
 
 
 def flown(settings: str, flavour: str, response: str, floor: float, height: float = 8.0) -> SingleVehicle:

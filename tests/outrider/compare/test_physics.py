@@ -57,6 +57,17 @@ def test_the_vehicle_has_rotors_and_keeps_its_own_distances(name: str) -> None:
     assert found.name == f"{name}-physics"
 
 
+@pytest.mark.parametrize(("name", "label"), [("lsc-empty", "20 vehicles"), ("range", "60 vehicles")])
+def test_a_row_with_more_vehicles_than_the_scenario_has_starts_for_them(name: str, label: str) -> None:
+    comparison, path = loaded(name)
+    found = in_physics(comparison, path)
+    rows = [row for row in found.rows if row.label == label]
+    (cell,) = cells_of(found, path, rows, None)
+    scenario = scenario_of(Scene.model_validate_json(cell.document), 1)
+    assert f"{scenario.vehicles} vehicles" == label
+    assert len(places(scenario)[0]) == scenario.vehicles
+
+
 def test_the_world_is_that_of_the_points_where_the_vehicle_has_a_way() -> None:
     """A seed draws the same worlds one after another: one that is passable for both is the same."""
     comparison, path = loaded("hdsm-circle")

@@ -84,8 +84,12 @@ def _vehicle(name: str) -> VehicleConfig:
 
 
 def _kept(base: Mapping[str, Any], where: Path, values: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the least distances (m) of two plans, and of a plan from surfaces, with ``values`` set."""
-    document = json.dumps(overlay(base, values)).encode()
+    """Return the least distances (m) of two plans, and of a plan from surfaces, with ``values`` set.
+
+    The number of vehicles has no part in them: the starts of a row with another number are drawn later.
+    """
+    kept = {key: value for key, value in values.items() if key != "vehicles"}
+    document = json.dumps(overlay(base, kept)).encode()
     config = read(document, f"{where}: physics", Scenario).companion
     terms = config.certified, config.field, config.limits
     return between(*terms), from_surfaces(*terms)
