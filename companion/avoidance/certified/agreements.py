@@ -112,15 +112,17 @@ class Agreements:
             self.refused += 1
 
     def _place(self, now: int, peer: Peer) -> None:
-        """Count a ``peer`` that was heard, unless its plans show that it is beyond the range.
+        """Count a ``peer`` that was heard, unless its plan shows that it is beyond the range.
 
-        They are the one that it flies now, if it was received, and its newest one.
+        That is its plan of the present epoch, or else its newest one: after an older plan it may have been
+        flown by another controller, and have begun anew elsewhere.
         """
         if self._beyond is None:
             return
-        system, newest = peer.pair.peer, peer.plans.newest
-        flown = peer.plans.before(now)
-        if any(plan is not None and self._beyond(now, plan) for plan in (flown, newest)):
+        system, plan = peer.pair.peer, peer.plans.before(now)
+        if plan is None or now >= plan.plan.epoch + self._config.epoch_us:
+            plan = peer.plans.newest
+        if plan is not None and self._beyond(now, plan):
             if system in self._peers:
                 peer.part()
                 self._distant[system] = self._peers.pop(system)

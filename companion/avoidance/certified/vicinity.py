@@ -35,13 +35,14 @@ class Vicinity:
         """Return whether a vehicle with ``plan`` is certainly beyond the range at ``now`` (µs).
 
         ``place`` (3,), m: where the own plan is then. The vehicle flies its plan in the plan's epoch. Before
-        and after, it flies no faster than plans may, to where that epoch begins and from where it ends.
+        it flies to the place where the plan begins, afterwards from the place where the plan is at the end
+        of the epoch, and never faster than plans may.
         """
         begins = plan.plan.epoch
         ends = begins + self._knots * plan.plan.dt
         if begins <= now < ends:
-            # Exact, so that two vehicles at rest agree on it at all times. With a bound from the ends of the
-            # epoch they would part at these and meet in the middle, and never have an agreement.
+            # Exact, so that two vehicles at rest decide alike throughout the epoch. With a bound from its
+            # ends they would part at these and meet in the middle, and never have an agreement.
             return _apart(place, _position(plan, now)) > self._beyond
         return any(
             _apart(place, there) - 1e-6 * abs(now - time) * self._speed > self._beyond

@@ -86,9 +86,11 @@ def _vehicle(name: str) -> VehicleConfig:
 def _kept(base: Mapping[str, Any], where: Path, values: Mapping[str, Any]) -> tuple[float, float]:
     """Return the least distances (m) of two plans, and of a plan from surfaces, with ``values`` set.
 
-    The number of vehicles has no part in them: the starts of a row with another number are drawn later.
+    The number of vehicles has no part in them: the starts of a row with another number are drawn later, if
+    it does not set them.
     """
-    kept = {key: value for key, value in values.items() if key != "vehicles"}
+    drawn = not any(key.split(".")[0] == "starts" for key in values)
+    kept = {key: value for key, value in values.items() if not (drawn and key == "vehicles")}
     document = json.dumps(overlay(base, kept)).encode()
     config = read(document, f"{where}: physics", Scenario).companion
     terms = config.certified, config.field, config.limits

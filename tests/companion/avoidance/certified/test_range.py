@@ -215,6 +215,24 @@ def test_who_is_heard_beyond_the_range_costs_nothing_and_is_met_anew() -> None:
     assert (entry.agreements, entry.considered) == ((), (EPOCH, EPOCH))
 
 
+def test_who_has_begun_anew_within_the_range_is_counted_whatever_its_old_plans_say() -> None:
+    """Another controller has flown it here; its first plan begins with the next epoch."""
+    one = limited()
+    one.receive_plan(NOW, OTHER, pack(plan(x=11.0)))
+    assert not one.members
+    one.receive_plan(NOW + 5 * LENGTH, OTHER, pack(plan(6, x=4.0)))
+    assert one.members == {OTHER}
+
+
+def test_the_plan_of_the_present_epoch_counts_until_the_next_one_begins() -> None:
+    one = limited()
+    one.receive_plan(NOW, OTHER, pack(plan(x=11.0)))
+    one.receive_plan(NOW, OTHER, pack(plan(1, x=9.0)))
+    assert not one.members
+    one.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, x=9.0)))
+    assert one.members == {OTHER}
+
+
 def test_who_is_silent_stays_counted() -> None:
     one = limited()
     met(one)
