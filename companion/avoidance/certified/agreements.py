@@ -119,9 +119,8 @@ class Agreements:
         """
         if self._beyond is None:
             return
-        system, plan = peer.pair.peer, peer.plans.before(now)
-        if plan is None or now >= plan.plan.epoch + self._config.epoch_us:
-            plan = peer.plans.newest
+        system, plans = peer.pair.peer, peer.plans
+        plan = plans.get(now - now % self._config.epoch_us) or plans.newest
         if plan is not None and self._beyond(now, plan):
             if system in self._peers:
                 peer.part()

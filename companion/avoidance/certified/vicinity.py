@@ -14,6 +14,7 @@ from math import hypot
 
 import numpy as np
 
+from companion.avoidance.certified.committed import horizon_of
 from companion.avoidance.certified.margins import fastest, sideways
 from companion.avoidance.certified.peer_plans import StoredPlan
 from companion.config import CompanionConfig
@@ -43,7 +44,7 @@ class Vicinity:
         if begins <= now < ends:
             # Exact, so that two vehicles at rest decide alike throughout the epoch. With a bound from its
             # ends they would part at these and meet in the middle, and never have an agreement.
-            return _apart(place, _position(plan, now)) > self._beyond
+            return _apart(place, horizon_of(plan.plan).at(now).position) > self._beyond
         return any(
             _apart(place, there) - 1e-6 * abs(now - time) * self._speed > self._beyond
             for time, there in (
@@ -56,15 +57,6 @@ class Vicinity:
 def _apart(place: Array, there: Array) -> float:
     """Return the horizontal distance (m) of two places."""
     return hypot(place[0] - there[0], place[1] - there[1])
-
-
-def _position(plan: StoredPlan, now: int) -> Array:
-    """Return where ``plan`` is (3,), m, at ``now`` (µs), which is in its epoch."""
-    knot, rest = divmod(now - plan.plan.epoch, plan.plan.dt)
-    share = rest / plan.plan.dt
-    first, middle, last = plan.rested[knot]
-    found: Array = (1.0 - share) ** 2 * first + 2.0 * share * (1.0 - share) * middle + share**2 * last
-    return found
 
 
 def region(own: Array, towards: Array, sides: Array) -> Array:

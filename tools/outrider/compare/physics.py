@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.avoidance.certified.margins import between, from_surfaces
+from companion.config import CompanionConfig
 from outrider.compare.comparison import Comparison, Measure, Missions
 from outrider.compare.world import Maze, World
 from outrider.errors import InputError
@@ -86,13 +87,10 @@ def _vehicle(name: str) -> VehicleConfig:
 def _kept(base: Mapping[str, Any], where: Path, values: Mapping[str, Any]) -> tuple[float, float]:
     """Return the least distances (m) of two plans, and of a plan from surfaces, with ``values`` set.
 
-    The number of vehicles has no part in them: the starts of a row with another number are drawn later, if
-    it does not set them.
+    They follow from the companion's settings alone. The whole scenario is checked with its drawn starts.
     """
-    drawn = not any(key.split(".")[0] == "starts" for key in values)
-    kept = {key: value for key, value in values.items() if not (drawn and key == "vehicles")}
-    document = json.dumps(overlay(base, kept)).encode()
-    config = read(document, f"{where}: physics", Scenario).companion
+    document = json.dumps(overlay(base, values)["companion"]).encode()
+    config = read(document, f"{where}: physics, companion", CompanionConfig)
     terms = config.certified, config.field, config.limits
     return between(*terms), from_surfaces(*terms)
 
