@@ -2,9 +2,10 @@
 
 Vehicles that meet head on in such a lane press against each other's planes for ever. So each works out the
 next steps of all on a lattice (``giving_way.py``), from where the newest plans end and from the goals that
-all tell. If it meets another one within these steps, it aims along its own ones: ahead, aside, or back. The
-smaller id has priority, before all that have been at their goals. Vehicles that have received other things
-may expect other steps; that costs time, and no distance: sub-goals change only the cost of plans.
+all tell. If it meets another one within these steps, or others are beside the straight line to where it
+would go alone, it aims along its own steps: ahead, aside, or back. The smaller id has priority, before all
+that have been at their goals. Vehicles that have received other things may expect other steps; that costs
+time, and no distance: sub-goals change only the cost of plans.
 
 Goals are beside the lattice's places. A vehicle that stands at its goal may be nearer to another place than
 two vehicles can be, although its own place is not. So it stands at its place while another one comes there.
@@ -18,6 +19,7 @@ from math import hypot
 import numpy as np
 
 from companion.values.horizon import Array
+from companion.ways.balls import Balls
 from companion.ways.clearance import Clearance
 from companion.ways.giving_way import Lengths, step
 from companion.ways.lattice import Lattice
@@ -36,17 +38,21 @@ class Lanes:
 
     ``apart`` (m): distance of the places at which vehicles stand beside each other. ``kept`` (m): clearance
     that plans keep; others push vehicles out of the lines between places, but not nearer to obstacles.
+    ``between`` (m): what two plans keep between them.
     """
 
-    def __init__(self, clear: Clearance, clearance: float, apart: float, kept: float) -> None:
-        self._clear, self._seen = clear, _SEEN * kept
+    def __init__(
+        self, clear: Clearance, clearance: float, apart: float, kept: float, between: float = 0.0
+    ) -> None:
+        self._clear, self._seen, self._between = clear, _SEEN * kept, between
         self._lattice = Lattice(clear, clearance, apart)
 
     def subgoal(self, own: int, travellers: Mapping[int, Traveller]) -> Subgoal | None:
         """Return where the vehicle ``own`` among ``travellers``, by id, aims for; None where it meets none.
 
-        It meets another one if that is on its way within the next steps, keeps it from its way, or comes near
-        its goal while it stands there.
+        It meets another one if that is on its way within the next steps, keeps it from its way, comes near
+        its goal while it stands there, or has its plan's end beside the line to the furthest place that it
+        sees.
         """
         systems = sorted(travellers)
         at = self._places(systems, travellers)
@@ -59,15 +65,18 @@ class Lanes:
             return None
         reached = [travellers[one].reached for one in systems]
         paths = self._paths(at, goals, reached, lengths)
-        path = [step[me] for step in paths]
+        path = _without_return(paths, me)
         others = {place for one, place in enumerate(at) if one != me}
         hinders = goals[me] in path and self._hinders(
             me, paths, goals, [travellers[one].goal for one in systems]
         )
-        if not hinders and path == self._alone(at[me], lengths[me]) and not others.intersection(path):
+        rest = travellers[own].rest
+        seen = self._seen_along(path, others, rest)
+        free = self._passing(seen, rest, [one.rest for system, one in travellers.items() if system != own])
+        meets = hinders or path != self._alone(at[me], lengths[me]) or not others.isdisjoint(path)
+        if not meets and free == seen:
             return None
-        goal = None if hinders else goals[me]
-        return self._along(path, others, travellers[own], goal, lengths[me])
+        return self._towards(free[-1], travellers[own], None if hinders else goals[me], lengths[me])
 
     def at_goal(self, rest: Array, goal: Array) -> bool:
         """Return whether a plan that ends at ``rest`` (3,) ends at the place of its ``goal`` (3,), m."""
@@ -129,23 +138,52 @@ class Lanes:
             path.append(place)
         return path
 
-    def _along(
-        self, path: list[int], others: set[int], own: Traveller, goal: int | None, lengths: Lengths
-    ) -> Subgoal:
-        """Return the furthest place of the ``path`` that is seen from the end of the plan; at ``goal`` that.
+    def _seen_along(self, path: list[int], others: set[int], rest: Array) -> list[int]:
+        """Return the places of the ``path`` up to the last one that is seen from ``rest`` (3,), m.
 
         The path counts up to where it waits or turns back, or where one of the ``others`` is now: beside a
         vehicle that is to leave a place across the own way, one that presses into it would keep it there.
         """
-        places, chosen = self._lattice.places, path[0]
         for index, node in enumerate(path[1:], 1):
             if node in path[:index] or node in others:
-                break
-            if not self._clear.sees(own.rest, places[node], self._seen):
-                break
-            chosen = node
-        place = places[chosen].copy()
-        if chosen == goal and self._clear.sees(own.rest, own.goal, self._seen):
+                return path[:index]
+            if not self._clear.sees(rest, self._lattice.places[node], self._seen):
+                return path[:index]
+        return path
+
+    def _passing(self, path: list[int], rest: Array, others: list[Array]) -> list[int]:
+        """Return the ``path`` up to the last place to which the line from ``rest`` (3,) passes the ``others``.
+
+        Plans of these end at (3,), m. The line to the next place is that of the lattice, beside which others
+        may stand.
+        """
+        if len(path) < 3 or not others:
+            return path
+        count = len(others)
+        balls = Balls(np.array(others), np.full(count, self._between), np.zeros(count)).without(rest)
+        free = balls.passed(rest, self._lattice.places[path])
+        blocked = np.flatnonzero(~free[2:])
+        return path[: 2 + int(blocked[0])] if len(blocked) else path
+
+    def _towards(self, node: int, own: Traveller, goal: int | None, lengths: Lengths) -> Subgoal:
+        """Return the place ``node`` on the way of ``own`` as its sub-goal; at its ``goal`` that itself."""
+        place = self._lattice.places[node].copy()
+        if node == goal and self._clear.sees(own.rest, own.goal, self._seen):
             place = own.goal.copy()
         place[2] = own.goal[2]
-        return Subgoal(place, self._lattice.apart * float(lengths[chosen]))
+        return Subgoal(place, self._lattice.apart * float(lengths[node]))
+
+
+def _without_return(paths: list[list[int]], me: int) -> list[int]:
+    """Return the path of ``me``, which waits where it would come back before another one has been there.
+
+    Two that see each other's ends of plans an epoch late would otherwise go and come back in turn, for ever.
+    """
+    path = [places[me] for places in paths]
+    here = path[0]
+    for index in range(len(path) - 1, 1, -1):
+        if path[index] == here:
+            visits = (places[one] == here for places in paths[1:index] for one in range(len(places)) if one != me)
+            if not any(visits):
+                return [here] * index + path[index:]
+    return path

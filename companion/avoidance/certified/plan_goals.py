@@ -63,7 +63,7 @@ class PlanGoals:
         self._detour = Detour(limits.within(config.field.margin(1)), certified.deadlock.detour)
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
         least = from_surfaces(certified, config.field, limits) + BESIDE_M
-        self._way = way_of(config, least, _EFFORT, BESIDE_M)
+        self._way = way_of(config, least, _EFFORT, BESIDE_M, obstacles.between)
         # Its search is loaded when it is prepared, so that a companion starts without it.
         self._space: SpaceDetour | None = None
         self._has_space = self._way is None and not config.planar
