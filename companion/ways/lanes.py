@@ -65,7 +65,9 @@ class Lanes:
             return None
         reached = [travellers[one].reached for one in systems]
         paths = self._paths(at, goals, reached, lengths)
-        path = _without_return(paths, me)
+        path = [step[me] for step in paths]
+        if reached[me] and not all(reached):
+            path = _without_return(paths, me)
         others = {place for one, place in enumerate(at) if one != me}
         hinders = goals[me] in path and self._hinders(
             me, paths, goals, [travellers[one].goal for one in systems]
@@ -177,7 +179,8 @@ class Lanes:
 def _without_return(paths: list[list[int]], me: int) -> list[int]:
     """Return the path of ``me``, which waits where it would come back before another one has been there.
 
-    Two that see each other's ends of plans an epoch late would otherwise go and come back in turn, for ever.
+    Otherwise it may go and come back in turn with one that is on its way, and that sees the ends of its plans
+    an epoch late.
     """
     path = [places[me] for places in paths]
     here = path[0]
