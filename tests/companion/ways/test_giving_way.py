@@ -165,13 +165,13 @@ def by(x: float, y: float) -> np.ndarray:
     return np.array([x, y, 0.0])
 
 
-def hall() -> tuple[Lanes, Lattice]:
-    """A room without walls, and its lattice of a metre."""
+def hall(between: float = 0.0) -> tuple[Lanes, Lattice]:
+    """A room without walls, and its lattice of a metre; plans keep ``between`` (m) from each other."""
     far = Box(kind="box", at=(9.0, 9.0, 1.25), size=(0.5, 0.5, 2.5))
     clear = Clearance(
         [far], grid(LIMITS.model_copy(update={"box_max": (4.5, 4.5, 2.5)}), 0.1, 150_000, 1.0), 0.5
     )
-    return Lanes(clear, 0.2, 1.0, 0.2), Lattice(clear, 0.2, 1.0)
+    return Lanes(clear, 0.2, 1.0, 0.2, between), Lattice(clear, 0.2, 1.0)
 
 
 @pytest.mark.parametrize("off", [0.0, 0.1, 0.45])
@@ -203,6 +203,56 @@ def test_vehicles_at_goals_a_metre_apart_stay_there_wherever_the_lattice_lies() 
             known = {11 + k: Traveller(stand[k], goals[k], reached=True) for k in range(3)}
             for k in range(3):
                 assert of.subgoal(11 + k, known) is None
+
+
+def test_a_vehicle_passes_one_that_stands_beside_the_straight_line_by_its_steps() -> None:
+    """Alone it would press against the planes of the other one, which has no reason to make room."""
+    of, lattice = hall(between=0.7)
+    place = lattice.places[lattice.nearest(np.array([1.0, 0.7, 1.0]))]
+    stands = Traveller(place + by(1.0, 1.0), place + by(1.0, 1.0), reached=True)
+    comes = Traveller(place, place + by(1.0, 2.0))
+    ahead = of.subgoal(11, {11: comes, 12: stands})
+    assert ahead is not None
+    assert np.allclose(ahead.place, place + by(0.0, 2.0))
+    assert of.subgoal(12, {11: comes, 12: stands}) is None
+    further = stands._replace(rest=place + by(2.0, 1.0))
+    assert of.subgoal(11, {11: comes, 12: further}) is None
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_sub_goal_beyond_the_next_place_is_free_of_those_that_stand_there(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    of, lattice = hall(between=0.7)
+    at, goal, *stand = random.permutation(len(lattice.places))[:8].tolist()
+    known = {11: Traveller(lattice.places[at], lattice.places[goal])}
+    for system, node in enumerate(stand, 12):
+        rest = lattice.places[node] + by(*random.uniform(-0.2, 0.2, 2))
+        known[system] = Traveller(rest, rest, reached=True)
+    subgoal = of.subgoal(11, known)
+    place = lattice.places[goal] if subgoal is None else subgoal.place
+    if subgoal is None or lattice.nearest(place) not in (at, *lattice.beside[at]):
+        line, off = place - lattice.places[at], np.array([one.rest for one in known.values()][1:])
+        off = off - lattice.places[at]
+        share = np.clip(off @ line / (line @ line), 0.0, 1.0)
+        assert np.linalg.norm(off - share[:, None] * line, axis=1).min() > 0.7 - 1e-6
+
+
+def test_a_vehicle_waits_beside_its_goal_for_one_that_is_to_pass_there() -> None:
+    """It would go there and come back at once, and the other one, which sees that, would turn aside."""
+    of, lattice = hall()
+    goal = lattice.places[lattice.nearest(np.array([1.0, 1.7, 1.0]))]
+    waits = Traveller(goal - by(1.0, 0.0), goal, reached=True)
+
+    def place(other: Traveller, own: Traveller = waits) -> np.ndarray:
+        subgoal = of.subgoal(12, {11: other, 12: own})
+        return own.goal if subgoal is None else subgoal.place
+
+    comes = Traveller(goal - by(0.0, 2.0), goal + by(0.0, 2.0))
+    assert np.allclose(place(comes), waits.rest)
+    assert np.allclose(place(comes._replace(rest=goal + by(0.0, 1.0))), goal)
+    # Two that make room for nobody else do not wait for each other.
+    assert np.allclose(place(comes._replace(reached=True)), goal)
+    assert np.allclose(place(comes, waits._replace(reached=False)), goal)
 
 
 @pytest.mark.parametrize("off", [0.15, 0.24, 0.26, 0.5])
@@ -246,3 +296,33 @@ def test_committed_plans_meet_in_a_lane_and_all_arrive(apart: float | None) -> N
     off = np.linalg.norm(ends - goals, axis=1)
     assert swarm.faults() == []
     assert (off.max() < 0.1) == (apart is not None), off
+
+
+@pytest.mark.slow
+def test_one_arrives_between_vehicles_that_stand_half_a_metre_apart() -> None:
+    """Beside a wall it pressed against two of them, and then it and one of these turned back by turns."""
+    goals = np.array([[2.0, 0.5 * k + 1.0, 1.0] for k in range(5)])
+    starts = goals.copy()
+    starts[2] = (1.5, 0.5, 1.0)
+    wall = Box(kind="box", at=(1.0, 2.5, 1.25), size=(0.5, 3.5, 2.5))
+    limits = LIMITS.model_copy(
+        update={"v_max": (1.0, 1.0, 1.0), "u_max": (2.0, 2.0, 1.0), "box_max": (4.5, 4.5, 2.5)}
+    )
+    swarm = Swarm(
+        starts,
+        Rough(delay=0),
+        [Habits()] * 5,
+        1,
+        planar=True,
+        settings={"tube": 0.008, "drift": 0.008, "clock_us": 0, "d_min_obstacle": 0.15},
+        more={
+            "limits": limits,
+            "field": {"d_min": 0.3, "d_safe": 1.5, "downwash": 2.0},
+            "way": {"clearance": 0.2, "cell": 0.1, "lanes": 0.5},
+            "obstacles": [wall.model_dump()],
+        },
+    )
+    swarm.run(15_000_000, lambda _since, system: goals[system - 1])
+    ends = np.array([one.plan(EPOCH + 15_000_000).positions_m()[0] for one in swarm.vehicles])
+    assert swarm.faults() == []
+    assert np.linalg.norm(ends - goals, axis=1).max() < 0.1
