@@ -154,10 +154,10 @@ class Lanes:
         return path
 
     def _passing(self, path: list[int], rest: Array, others: list[Array]) -> list[int]:
-        """Return the ``path`` up to the last place to which the line from ``rest`` (3,) passes the ``others``.
+        """Return the ``path`` as far as lines from ``rest`` (3,), m, to its places pass the ``others``.
 
-        Plans of these end at (3,), m. The line to the next place is that of the lattice, beside which others
-        may stand.
+        Their plans end at ``others`` (3,), m. The line to the next place is one of the lattice, beside which
+        others may stand.
         """
         if len(path) < 3 or not others:
             return path
@@ -185,8 +185,7 @@ def _without_return(paths: list[list[int]], me: int) -> list[int]:
     path = [places[me] for places in paths]
     here = path[0]
     for index in range(len(path) - 1, 1, -1):
-        if path[index] == here:
-            visits = (places[one] == here for places in paths[1:index] for one in range(len(places)) if one != me)
-            if not any(visits):
-                return [here] * index + path[index:]
+        between = zip(path[1:index], paths[1:index], strict=True)
+        if path[index] == here and not any(here in places for own, places in between if own != here):
+            return [here] * index + path[index:]
     return path
