@@ -115,13 +115,14 @@ class Agreements:
         """Count a ``peer`` that was heard, unless its plan shows that it is beyond the range.
 
         That is its plan of the present epoch, or else its newest one: after an older plan it may have been
-        flown by another controller, and have begun anew elsewhere.
+        flown by another controller, and have begun anew elsewhere. Plans of before that show nothing.
         """
         if self._beyond is None:
             return
         system, plans = peer.pair.peer, peer.plans
-        plan = plans.get(now - now % self._config.epoch_us) or plans.newest
-        if plan is not None and self._beyond(now, plan):
+        flown = max(now - now % self._config.epoch_us, peer.since)
+        plan = plans.get(flown) or plans.newest
+        if plan is not None and plan.plan.epoch >= peer.since and self._beyond(now, plan):
             if system in self._peers:
                 peer.part()
                 self._distant[system] = self._peers.pop(system)

@@ -233,6 +233,23 @@ def test_the_plan_of_the_present_epoch_counts_until_the_next_one_begins() -> Non
     assert one.members == {OTHER}
 
 
+@pytest.mark.parametrize("first", [LENGTH, 2 * LENGTH])
+def test_no_plan_of_before_it_began_anew_shows_that_a_vehicle_is_beyond(first: int) -> None:
+    """Its first plan here is lost, and the statement that came with it is not."""
+    one = limited()
+    one.receive_plan(NOW, OTHER, pack(plan(x=11.0)))
+    one.receive_plan(NOW, OTHER, pack(plan(1, x=11.0)))
+    one.receive_statement(NOW, OTHER, statement(1))
+    assert not one.members
+    one.receive_statement(NOW + LENGTH, OTHER, statement(2, since=2))
+    assert one.members == {OTHER}
+    # Nor does one that comes late.
+    one.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, x=11.0)))
+    assert one.members == {OTHER}
+    one.receive_plan(NOW + first, OTHER, pack(plan(2, x=11.0)))
+    assert not one.members
+
+
 def test_who_is_silent_stays_counted() -> None:
     one = limited()
     met(one)
