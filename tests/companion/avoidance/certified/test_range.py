@@ -152,12 +152,13 @@ def test_who_seems_beyond_is_beyond_however_old_the_plan_is(seed: int, later: in
     assert (np.linalg.norm((possible - place)[:, :2], axis=1) > RANGE + margins).all()
 
 
-@given(seeds, st.integers(0, LENGTH - 1))
+@given(seeds, st.floats(0.0, 0.999), st.sampled_from([1, 2]))
 @settings(max_examples=40, deadline=None)
-def test_in_the_epoch_of_a_plan_it_is_known_who_is_beyond(seed: int, later: int) -> None:
-    """However near the limit: there is no distance at which it depends on the time."""
+def test_in_the_epoch_of_a_plan_it_is_known_who_is_beyond(seed: int, share: float, knots: int) -> None:
+    """However near the limit, and however many knots an epoch has: it never depends on the time."""
     rng = np.random.default_rng(seed)
-    of = config()
+    of = config(epoch_us=knots * DT, dt_us=DT)
+    later = int(share * of.certified.epoch_us)
     theirs = stored(random_plan(rng, rng.uniform(-12, 12, 3), speed=0.8))
     now = EPOCH + later
     flown = horizon_of(theirs.plan).at(now).position
