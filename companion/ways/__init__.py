@@ -12,14 +12,12 @@ if TYPE_CHECKING:
     from companion.ways.way import Way
 
 
-def way_of(
-    config: CompanionConfig, least: float, effort: int = 1, spare: float = 0.0, between: float = 0.0
-) -> Way | None:
+def way_of(config: CompanionConfig, least: float, effort: int = 1, spare: float = 0.0) -> Way | None:
     """Return the way of a vehicle with ``config``; None where ways are off or there is no fixed obstacle.
 
-    ``least`` (m): clearance that a way must have, of which plans need not keep ``spare`` (m).
-    ``between`` (m): what two plans keep between them. A plan does ``effort`` times ``way.parts`` of a search.
-    The search is loaded only here, because most companions need none.
+    ``least`` (m): clearance that a way must have, of which plans need not keep ``spare`` (m). A plan does
+    ``effort`` times ``way.parts`` of a search. The search is loaded only here, because most companions need
+    none.
     """
     if config.way is None or not config.obstacles:
         return None
@@ -27,16 +25,7 @@ def way_of(
 
     limits = config.limits.within(config.field.margin(1))
     parts = effort * config.way.parts
-    return Way(
-        config.way,
-        _obstacles(config),
-        limits,
-        least,
-        parts,
-        planar=config.planar,
-        spare=spare,
-        between=between,
-    )
+    return Way(config.way, _obstacles(config), limits, least, parts, planar=config.planar, spare=spare)
 
 
 def space_detour_of(config: CompanionConfig, kept: float, between: float, spare: float) -> SpaceDetour:

@@ -2,8 +2,8 @@
 
 Vehicles that meet head on in such a lane press against each other's planes for ever. So each works out the
 next steps of all on a lattice (``giving_way.py``), from where the newest plans end and from the goals that
-all tell. If it meets another one within these steps, or others are beside the straight line to where it
-would go alone, it aims along its own steps: ahead, aside, or back. The smaller id has priority, before all
+all tell. If it meets another one within these steps, or others stand beside the line to where it would go
+without lanes, it aims along its own steps: ahead, aside, or back. The smaller id has priority, before all
 that have been at their goals. Vehicles that have received other things may expect other steps; that costs
 time, and no distance: sub-goals change only the cost of plans.
 
@@ -38,47 +38,53 @@ class Lanes:
 
     ``apart`` (m): distance of the places at which vehicles stand beside each other. ``kept`` (m): clearance
     that plans keep; others push vehicles out of the lines between places, but not nearer to obstacles.
-    ``between`` (m): what two plans keep between them.
     """
 
-    def __init__(
-        self, clear: Clearance, clearance: float, apart: float, kept: float, between: float = 0.0
-    ) -> None:
-        self._clear, self._seen, self._between = clear, _SEEN * kept, between
+    def __init__(self, clear: Clearance, clearance: float, apart: float, kept: float) -> None:
+        self._clear, self._seen = clear, _SEEN * kept
         self._lattice = Lattice(clear, clearance, apart)
 
-    def subgoal(self, own: int, travellers: Mapping[int, Traveller]) -> Subgoal | None:
+    def subgoal(
+        self, own: int, travellers: Mapping[int, Traveller], aim: Array, between: float
+    ) -> Subgoal | None:
         """Return where the vehicle ``own`` among ``travellers``, by id, aims for; None where it meets none.
 
-        It meets another one if that is on its way within the next steps, keeps it from its way, comes near
-        its goal while it stands there, or has its plan's end beside the line to the furthest place that it
-        sees.
+        It meets another one if that is on its way within the next steps, keeps it from its way, or comes near
+        its goal while it stands there. Without lanes it would go to ``aim`` (3,), m. It goes by its steps,
+        too, where others that stay there stand nearer to that line than plans keep ``between`` them (m), and
+        the next step passes them.
         """
         systems = sorted(travellers)
         at = self._places(systems, travellers)
         goals = [self._lattice.nearest(travellers[one].goal) for one in systems]
         if min(at, default=-1) < 0 or min(goals) < 0:
             return None
-        lengths = [self._lattice.lengths(goal) for goal in goals]
         me = systems.index(own)
-        if int(lengths[me][at[me]]) >= len(self._lattice.places):
-            return None
+        for one, goal in enumerate(goals):
+            if int(self._lattice.lengths(goal)[at[one]]) >= len(self._lattice.places):
+                if one == me:
+                    return None
+                # No way leads to its goal.
+                goals[one] = at[one]
+        lengths = [self._lattice.lengths(goal) for goal in goals]
         reached = [travellers[one].reached for one in systems]
         paths = self._paths(at, goals, reached, lengths)
-        path = [step[me] for step in paths]
-        if reached[me] and not all(reached):
-            path = _without_return(paths, me)
+        path = _without_return(paths, me, reached) if reached[me] else [places[me] for places in paths]
         others = {place for one, place in enumerate(at) if one != me}
         hinders = goals[me] in path and self._hinders(
             me, paths, goals, [travellers[one].goal for one in systems]
         )
-        rest = travellers[own].rest
-        seen = self._seen_along(path, others, rest)
-        free = self._passing(seen, rest, [one.rest for system, one in travellers.items() if system != own])
+        rest, places = travellers[own].rest, self._lattice.places
+        stays = [
+            one for one, place in enumerate(at) if one != me and all(step[one] == place for step in paths)
+        ]
+        stand = _balls([travellers[systems[one]].rest for one in stays], between)
         meets = hinders or path != self._alone(at[me], lengths[me]) or not others.isdisjoint(path)
-        if not meets and free == seen:
+        if not meets and (_passed(stand.without(rest), rest, aim) or not _passed(stand, *places[path[:2]])):
             return None
-        return self._towards(free[-1], travellers[own], None if hinders else goals[me], lengths[me])
+        seen = self._seen_along(path, others, rest)
+        node = self._passing(seen, rest, stand.without(rest))
+        return self._towards(node, travellers[own], None if hinders else goals[me], lengths[me])
 
     def at_goal(self, rest: Array, goal: Array) -> bool:
         """Return whether a plan that ends at ``rest`` (3,) ends at the place of its ``goal`` (3,), m."""
@@ -153,19 +159,13 @@ class Lanes:
                 return path[:index]
         return path
 
-    def _passing(self, path: list[int], rest: Array, others: list[Array]) -> list[int]:
-        """Return the ``path`` as far as lines from ``rest`` (3,), m, to its places pass the ``others``.
+    def _passing(self, path: list[int], rest: Array, stand: Balls) -> int:
+        """Return the furthest place of the ``path`` to which the line from ``rest`` (3,), m, meets no ball.
 
-        Their plans end at ``others`` (3,), m. The line to the next place is one of the lattice, beside which
-        others may stand.
+        At least it is the next place, to which the line is one of the lattice.
         """
-        if len(path) < 3 or not others:
-            return path
-        count = len(others)
-        balls = Balls(np.array(others), np.full(count, self._between), np.zeros(count)).without(rest)
-        free = balls.passed(rest, self._lattice.places[path])
-        blocked = np.flatnonzero(~free[2:])
-        return path[: 2 + int(blocked[0])] if len(blocked) else path
+        blocked = np.flatnonzero(~stand.passed(rest, self._lattice.places[path])[2:])
+        return path[1 + int(blocked[0])] if len(blocked) else path[-1]
 
     def _towards(self, node: int, own: Traveller, goal: int | None, lengths: Lengths) -> Subgoal:
         """Return the place ``node`` on the way of ``own`` as its sub-goal; at its ``goal`` that itself."""
@@ -176,16 +176,31 @@ class Lanes:
         return Subgoal(place, self._lattice.apart * float(lengths[node]))
 
 
-def _without_return(paths: list[list[int]], me: int) -> list[int]:
-    """Return the path of ``me``, which waits where it would come back before another one has been there.
+def _balls(others: list[Array], between: float) -> Balls:
+    """Return balls of the radius ``between`` (m) about ``others`` (3,), m, of which heights do not count."""
+    count = len(others)
+    return Balls(np.array(others).reshape(count, 3), np.full(count, between), np.zeros(count))
 
-    Otherwise it may go and come back in turn with one that is on its way, and that sees the ends of its plans
-    an epoch late.
+
+def _passed(stand: Balls, here: Array, there: Array) -> bool:
+    """Return whether the line from ``here`` to ``there`` (3,), m, meets no ball."""
+    return bool(stand.passed(here, there[None])[0])
+
+
+def _without_return(paths: list[list[int]], me: int, reached: list[bool]) -> list[int]:
+    """Return the path of ``me``, which waits where one on its way would send it back before another comes.
+
+    Otherwise it goes while that one turns aside for it, and comes back while that one goes: each sees the end
+    of the other one's plan an epoch late. Those that have ``reached`` their goals are not on their way.
     """
     path = [places[me] for places in paths]
     here = path[0]
+    on_way = [one for one, done in enumerate(reached) if not done]
     for index in range(len(path) - 1, 1, -1):
-        between = zip(path[1:index], paths[1:index], strict=True)
-        if path[index] == here and not any(here in places for own, places in between if own != here):
+        away = [step for step in range(1, index) if path[step] != here]
+        if path[index] != here or any(here in paths[step] for step in away):
+            continue
+        entered = {path[step] for step in away}
+        if any(paths[step][one] in entered for step in range(1, index + 1) for one in on_way):
             return [here] * index + path[index:]
     return path

@@ -46,7 +46,7 @@ class Way:
 
     ``least`` (m): clearance that a way must have. ``planar``: it stays at the height of the first place.
     ``parts``: how many parts of a search are done for each plan. ``spare`` (m): part of ``least`` that plans
-    need not keep. ``between`` (m): what two plans keep between them.
+    need not keep.
     """
 
     def __init__(
@@ -59,12 +59,11 @@ class Way:
         *,
         planar: bool = False,
         spare: float = 0.0,
-        between: float = 0.0,
     ) -> None:
         self._config, self._obstacles, self._limits = config, tuple(obstacles), limits
         self._clearances = [least + share * config.clearance for share in _SHARES]
         self._parts, self._level, self._planned = parts, np.nan, not planar
-        self._kept, self._between = least - spare, between
+        self._kept = least - spare
         # The clearances of a box take a tenth of a second or more: not in flight.
         self._clear = None if planar else self._clearance(None)
         self._followed: Followed | None = None
@@ -164,7 +163,7 @@ class Way:
         """Return the lanes at the height of a planar vehicle; None without ``way.lanes``, and at first."""
         clear, apart = self._clear, self._config.lanes
         if self._lanes is None and clear is not None and apart is not None and self._level == self._level:
-            self._lanes = Lanes(clear, self._clearances[-1], apart, self._kept, self._between)
+            self._lanes = Lanes(clear, self._clearances[-1], apart, self._kept)
         return self._lanes
 
     def _clear_at(self, height: float) -> Clearance:

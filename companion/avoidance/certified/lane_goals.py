@@ -23,22 +23,28 @@ if TYPE_CHECKING:
 class LaneGoals:
     """Sub-goals in lanes of the vehicle ``own`` (system id).
 
-    ``goals``: those that are told. ``way``: that of the vehicle, which has the lanes; ``in_use``: whether
-    vehicles give way in lanes.
+    ``goals``: those that are told. ``way``: that of the vehicle, which has the lanes. ``between`` (m): what
+    two plans keep between them. ``in_use``: whether vehicles give way in lanes.
     """
 
-    def __init__(self, own: int, goals: ToldGoals, way: Way | None, *, in_use: bool) -> None:
-        self._own, self._goals, self._way, self._in_use = own, goals, way, in_use
+    def __init__(self, own: int, goals: ToldGoals, way: Way | None, between: float, *, in_use: bool) -> None:
+        self._own, self._goals, self._way, self._between, self._in_use = own, goals, way, between, in_use
         self._goal: Array | None = None
         self._reached = False
 
     def subgoal(
-        self, rest: Array, destination: Array, ends: Callable[[], Mapping[int, Array]]
+        self,
+        now: int,
+        rest: Array,
+        destination: Array,
+        aim: Array,
+        ends: Callable[[], Mapping[int, Array]],
     ) -> Subgoal | None:
-        """Return where to aim for among vehicles that cannot pass; None where none is met.
+        """Return where to aim for at ``now`` (µs) among vehicles that cannot pass; None where none is met.
 
-        The own plan ends at ``rest`` (3,), on the way to ``destination`` (3,); those of the others end at
-        ``ends()`` (3,), by system id; m.
+        The own plan ends at ``rest`` (3,), on the way to ``destination`` (3,), and would aim for ``aim``
+        (3,); those of the others end at ``ends()`` (3,), by system id; m. One that has not told its goal
+        lately stays where it is.
         """
         if not self._in_use:
             return None
@@ -52,10 +58,10 @@ class LaneGoals:
         self._goals.tell(destination, reached=self._reached)
         if lanes is None:
             return None
-        travellers = {}
+        travellers, recent = {}, self._goals.recent(now)
         for system, end in ends().items():
-            told = self._goals.last(system)
+            told = recent.get(system)
             goal, reached = (end, True) if told is None else (told.position_m, told.reached)
             travellers[system] = Traveller(end, goal, reached)
         travellers[self._own] = Traveller(rest, destination, self._reached)
-        return lanes.subgoal(self._own, travellers)
+        return lanes.subgoal(self._own, travellers, aim, self._between)

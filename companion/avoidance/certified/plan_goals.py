@@ -63,7 +63,7 @@ class PlanGoals:
         self._detour = Detour(limits.within(config.field.margin(1)), certified.deadlock.detour)
         # A way keeps what plans keep, with some room for their planes. There are few plans: each does more.
         least = from_surfaces(certified, config.field, limits) + BESIDE_M
-        self._way = way_of(config, least, _EFFORT, BESIDE_M, obstacles.between)
+        self._way = way_of(config, least, _EFFORT, BESIDE_M)
         # Its search is loaded when it is prepared, so that a companion starts without it.
         self._space: SpaceDetour | None = None
         self._has_space = self._way is None and not config.planar
@@ -72,7 +72,7 @@ class PlanGoals:
         in_lanes = config.way is not None and config.way.lanes is not None
         # In space vehicles pass over each other, in lanes they give way.
         self._anticipates = config.planar and certified.anticipation.most > 0.0 and not in_lanes
-        self._lane_goals = LaneGoals(own.system, told, self._way, in_use=in_lanes)
+        self._lane_goals = LaneGoals(own.system, told, self._way, obstacles.between, in_use=in_lanes)
         # In lanes vehicles make room by steps, and tell their goals for that.
         self._gives_way = in_lanes
         self._room = None if in_lanes else Room(config, own.system, told, obstacles)
@@ -154,7 +154,7 @@ class PlanGoals:
         if way is not None and stalled:
             way.go_round(now, lambda: self._obstacles.at_rest(epoch, self._agreements))
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
-        in_lane = self._lane_goals.subgoal(rest, destination, self._agreements.ends)
+        in_lane = self._lane_goals.subgoal(now, rest, destination, goal.place, self._agreements.ends)
         if self._in_lane != (in_lane is not None):
             self._in_lane = in_lane is not None
             self._deadlock_turn.restart()

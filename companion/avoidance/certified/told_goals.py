@@ -34,11 +34,6 @@ class ToldGoals:
         if goal.origin == self._origin:
             self._received[system] = now, goal
 
-    def last(self, system: int) -> WireGoal | None:
-        """Return the last goal that ``system`` has told; None: it has told none."""
-        found = self._received.get(system)
-        return None if found is None else found[1]
-
     def recent(self, now: int) -> dict[int, WireGoal]:
         """Return the goals that are valid at ``now`` (µs), by system id."""
         return {s: goal for s, (time, goal) in self._received.items() if now - time <= _VALID_US}
