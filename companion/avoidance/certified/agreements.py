@@ -114,15 +114,15 @@ class Agreements:
     def _place(self, now: int, peer: Peer) -> None:
         """Count a ``peer`` that was heard, unless its plan shows that it is beyond the range.
 
-        That is its plan of the present epoch, or else its newest one: after an older plan it may have been
-        flown by another controller, and have begun anew elsewhere. Plans of before that show nothing.
+        That is its plan of the present epoch, or of its last beginning if that comes later, or else its
+        newest one: after an older plan it may have been flown by another controller. Plans of before it began
+        anew show nothing.
         """
         if self._beyond is None:
             return
         system, plans = peer.pair.peer, peer.plans
-        flown = max(now - now % self._config.epoch_us, peer.since)
-        plan = plans.get(flown) or plans.newest
-        if plan is not None and plan.plan.epoch >= peer.since and self._beyond(now, plan):
+        plan = plans.get(max(now - now % self._config.epoch_us, peer.begun)) or plans.newest
+        if plan is not None and plan.plan.epoch >= peer.begun and self._beyond(now, plan):
             if system in self._peers:
                 peer.part()
                 self._distant[system] = self._peers.pop(system)

@@ -39,8 +39,8 @@ class Peer:
     ``round_trip`` (µs): from a proposal to its answer. ``changed``: the entry about it has changed since it
     was last stated. ``settled``: the own newest plan with which the negotiation had nothing to do, and has
     nothing to do until ``settled_until`` (µs) if nothing new is known of the peer; None: it must look.
-    ``agreed``: the planes of all agreements that the own list holds. ``since`` (µs): the latest that a
-    statement of it tells: older plans do not say where it is.
+    ``agreed``: the planes of all agreements that the own list holds. ``begun`` (µs): the latest ``since`` of
+    its statements. Older plans do not show where it is.
     """
 
     def __init__(self, own: int, system: int, *, parts: bool = False) -> None:
@@ -57,7 +57,7 @@ class Peer:
         self.changed = True
         self.settled: StoredPlan | None = None
         self.settled_until = 0.0
-        self._statement_epoch = self.since = 0
+        self._statement_epoch = self.begun = 0
         self._proposed: dict[Agreement, int] = {}
         self._seen: dict[Statement, tuple[tuple[Agreement, ...], Agreement]] = {}
         self._conflict: int | None = None
@@ -148,7 +148,9 @@ class Peer:
 
     def _receive_head(self, statement: Statement) -> bool:
         """Receive what the newest statement alone tells; return whether the names have changed."""
-        self.since = max(self.since, statement.since)
+        if not statement.away:
+            # A vehicle under another controller makes no plan; its next ``since`` comes with one.
+            self.begun = max(self.begun, statement.since)
         if statement.epoch < self._statement_epoch:
             return False
         self._statement_epoch, self.away = statement.epoch, statement.away

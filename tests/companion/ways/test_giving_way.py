@@ -347,7 +347,7 @@ def test_committed_plans_meet_in_a_lane_and_all_arrive(apart: float | None) -> N
 
 @pytest.mark.slow
 def test_one_arrives_between_vehicles_that_stand_half_a_metre_apart() -> None:
-    """Beside a wall it pressed against two of them, and then it and one of these turned back by turns."""
+    """Beside a wall it pressed against two of them, and then it and one of these turned back in turn."""
     goals = np.array([[2.0, 0.5 * k + 1.0, 1.0] for k in range(5)])
     starts = goals.copy()
     starts[2] = (1.5, 0.5, 1.0)

@@ -244,11 +244,25 @@ def test_no_plan_of_before_it_began_anew_shows_that_a_vehicle_is_beyond(first: i
     assert not one.members
     one.receive_statement(NOW + LENGTH, OTHER, statement(2, since=2))
     assert one.members == {OTHER}
-    # Nor does one that comes late.
+    # Nor do a repeated plan, a late plan and a late statement.
     one.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, x=11.0)))
+    one.receive_plan(NOW + LENGTH, OTHER, pack(plan(-1, x=11.0)))
+    one.receive_statement(NOW + LENGTH, OTHER, statement(1))
     assert one.members == {OTHER}
     one.receive_plan(NOW + first, OTHER, pack(plan(2, x=11.0)))
     assert not one.members
+
+
+def test_one_under_another_controller_is_not_counted_for_its_beginnings() -> None:
+    """It begins anew wherever it has left its plan, and sends no plan of that."""
+    one = limited()
+    one.receive_plan(NOW, OTHER, pack(plan(x=11.0)))
+    one.receive_statement(NOW, OTHER, statement(0))
+    flown = statement(0, since=1)._replace(away=True)
+    one.receive_statement(NOW + LENGTH, OTHER, flown)
+    assert not one.members
+    one.receive_statement(NOW + LENGTH, OTHER, statement(1, since=1))
+    assert one.members == {OTHER}
 
 
 def test_who_is_silent_stays_counted() -> None:
