@@ -74,14 +74,14 @@ class Lanes:
         hinders = goals[me] in path and self._hinders(
             me, paths, goals, [travellers[one].goal for one in systems]
         )
-        rest, places = travellers[own].rest, self._lattice.places
-        stays = [
-            one for one, place in enumerate(at) if one != me and all(step[one] == place for step in paths)
-        ]
-        stand = _balls([travellers[systems[one]].rest for one in stays], between)
+        rest = travellers[own].rest
+        stay = [travellers[systems[one]].rest for one in _staying(paths) if one != me]
+        stand = Balls(np.array(stay).reshape(-1, 3), np.full(len(stay), between), np.zeros(len(stay)))
         meets = hinders or path != self._alone(at[me], lengths[me]) or not others.isdisjoint(path)
-        if not meets and (_passed(stand.without(rest), rest, aim) or not _passed(stand, *places[path[:2]])):
-            return None
+        if not meets:
+            here, there = self._lattice.places[path[:2]]
+            if _passed(stand.without(rest), rest, aim) or not _passed(stand, here, there):
+                return None
         seen = self._seen_along(path, others, rest)
         node = self._passing(seen, rest, stand.without(rest))
         return self._towards(node, travellers[own], None if hinders else goals[me], lengths[me])
@@ -176,10 +176,9 @@ class Lanes:
         return Subgoal(place, self._lattice.apart * float(lengths[node]))
 
 
-def _balls(others: list[Array], between: float) -> Balls:
-    """Return balls of the radius ``between`` (m) about ``others`` (3,), m, of which heights do not count."""
-    count = len(others)
-    return Balls(np.array(others).reshape(count, 3), np.full(count, between), np.zeros(count))
+def _staying(paths: list[list[int]]) -> list[int]:
+    """Return the vehicles that are at one place in all of ``paths``."""
+    return [one for one, places in enumerate(zip(*paths, strict=True)) if len(set(places)) == 1]
 
 
 def _passed(stand: Balls, here: Array, there: Array) -> bool:
@@ -197,10 +196,10 @@ def _without_return(paths: list[list[int]], me: int, reached: list[bool]) -> lis
     here = path[0]
     on_way = [one for one, done in enumerate(reached) if not done]
     for index in range(len(path) - 1, 1, -1):
-        away = [step for step in range(1, index) if path[step] != here]
-        if path[index] != here or any(here in paths[step] for step in away):
+        away = [k for k in range(1, index) if path[k] != here]
+        if path[index] != here or any(here in paths[k] for k in away):
             continue
-        entered = {path[step] for step in away}
-        if any(paths[step][one] in entered for step in range(1, index + 1) for one in on_way):
+        entered = {path[k] for k in away}
+        if any(paths[k][one] in entered for k in range(1, index + 1) for one in on_way):
             return [here] * index + path[index:]
     return path
