@@ -6,6 +6,7 @@ returns and lands, NAV_LAND lands.
 
 from __future__ import annotations
 
+import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
@@ -17,6 +18,12 @@ from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Message
 _GLOBAL = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _MAX_ALTITUDE = 1e5
 """m, bound on the magnitude of altitudes; the comparison with it also rejects NaN."""
+_EDGE_M = 0.1
+"""Distance outside the box, on each axis, up to which a goal counts as one on its edge.
+
+Positions in units of 1e-7 degrees have steps of 11 mm, and with two models of the Earth distances from the
+fleet origin may differ by 0.07 %.
+"""
 
 
 class Orders:
@@ -66,7 +73,7 @@ class Orders:
         """Set the goal to a global position, altitude above mean sea level; return whether it is accepted.
 
         The order is refused if its frame is not one of ``_GLOBAL``, if the position is invalid or outside the
-        box of ``limits``, and if the task is not "goto".
+        box of ``limits`` by more than ``_EDGE_M``, and if the task is not "goto".
         """
         latitude, longitude = order.x * 1e-7, order.y * 1e-7
         if order.frame not in _GLOBAL or abs(latitude) > 90.0 or abs(longitude) > 180.0:
@@ -75,7 +82,8 @@ class Orders:
             return False
         goal = self._fleet.to_enu(latitude, longitude, order.z)
         limits = self._config.limits
-        if self._config.task != "goto" or (goal < limits.box_min).any() or (goal > limits.box_max).any():
+        inside = np.clip(goal, limits.box_min, limits.box_max)
+        if self._config.task != "goto" or float(np.abs(goal - inside).max()) > _EDGE_M:
             return False
-        self._goals.goal = goal
+        self._goals.goal = inside
         return True

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from companion.config import CompanionConfig
+from companion.flight.orders import Orders
 from companion.values.phase import Phase
-from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, LocalPosition, Source
+from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Heartbeat, LocalPosition, Source
 from tests.companion.bench import (
+    FLEET,
     GROUND,
     HOLDING,
     LINKS,
@@ -106,6 +110,30 @@ def test_a_goal_that_is_no_place_is_denied_and_moves_nothing(flying, x, y, z, fr
     found = setpoints(flying.fly(2.0))
     assert np.isfinite([numbers_of(m) for m in found]).all()
     np.testing.assert_allclose(flying.autopilot.position, HOLDING, atol=0.1)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(("off", "taken"), [(-0.5, True), (0.0, True), (0.09, True), (0.11, False)])
+def test_a_goal_about_on_the_edge_of_the_box_is_taken_within_it(axis, side, off, taken):
+    """Positions are rounded to 1.1 cm, so a goal on the edge may arrive outside."""
+    config = CompanionConfig(task="goto")
+    low, high = np.array(config.limits.box_min), np.array(config.limits.box_max)
+    goal = 0.5 * (low + high)
+    goal[axis] = (low, goal, high)[1 + side][axis] + side * off
+    goals = SimpleNamespace(goal=None)
+    orders = Orders(config, Source(SYSTEM, 195), FLEET, None, goals)
+    latitude, longitude, altitude = FLEET.to_geodetic(goal)
+    place = round(latitude * 1e7), round(longitude * 1e7), altitude
+    (ack,) = orders.obey(
+        CommandInt(GROUND, SYSTEM, 195, 0, mavlink.MAV_CMD_DO_REPOSITION, (-1.0, 0.0, 0.0, NAN), *place)
+    )
+    assert (ack.result == mavlink.MAV_RESULT_ACCEPTED) == taken
+    assert (goals.goal is not None) == taken
+    if taken:
+        np.testing.assert_allclose(goals.goal, np.clip(goal, low, high), atol=0.01)
+        assert (goals.goal >= low).all()
+        assert (goals.goal <= high).all()
 
 
 # Orders under way
