@@ -60,12 +60,9 @@ class Lanes:
         if min(at, default=-1) < 0 or min(goals) < 0:
             return None
         me = systems.index(own)
-        for one, goal in enumerate(goals):
-            if int(self._lattice.lengths(goal)[at[one]]) >= len(self._lattice.places):
-                if one == me:
-                    return None
-                # No way leads to its goal.
-                goals[one] = at[one]
+        if not self._leads(at[me], goals[me]):
+            return None
+        goals = [goal if self._leads(here, goal) else here for here, goal in zip(at, goals, strict=True)]
         lengths = [self._lattice.lengths(goal) for goal in goals]
         reached = [travellers[one].reached for one in systems]
         paths = self._paths(at, goals, reached, lengths)
@@ -77,19 +74,24 @@ class Lanes:
         rest = travellers[own].rest
         stay = [travellers[systems[one]].rest for one in _staying(paths) if one != me]
         stand = Balls(np.array(stay).reshape(-1, 3), np.full(len(stay), between), np.zeros(len(stay)))
+        around = stand.without(rest)
         meets = hinders or path != self._alone(at[me], lengths[me]) or not others.isdisjoint(path)
         if not meets:
             here, there = self._lattice.places[path[:2]]
-            if _passed(stand.without(rest), rest, aim) or not _passed(stand, here, there):
+            if _passed(around, rest, aim) or not _passed(stand, here, there):
                 return None
         seen = self._seen_along(path, others, rest)
-        node = self._passing(seen, rest, stand.without(rest))
+        node = self._passing(seen, rest, around)
         return self._towards(node, travellers[own], None if hinders else goals[me], lengths[me])
 
     def at_goal(self, rest: Array, goal: Array) -> bool:
         """Return whether a plan that ends at ``rest`` (3,) ends at the place of its ``goal`` (3,), m."""
         node = self._lattice.nearest(goal)
         return node >= 0 and node == self._lattice.nearest(rest)
+
+    def _leads(self, here: int, goal: int) -> bool:
+        """Return whether a way on the lattice leads from the place ``here`` to ``goal``."""
+        return int(self._lattice.lengths(goal)[here]) < len(self._lattice.places)
 
     def _places(self, systems: list[int], travellers: Mapping[int, Traveller]) -> list[int]:
         """Return the places at which the plans of ``systems`` end, a different one for each; −1 for none.

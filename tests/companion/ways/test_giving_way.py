@@ -318,30 +318,41 @@ def test_who_has_been_at_the_place_of_its_goal_has_reached_it(off: float) -> Non
     assert unpack(message.payload).reached == (off < 0.25)
 
 
+def distances_from_goals(
+    starts: np.ndarray, goals: np.ndarray, seconds: int, delay: int, more: dict[str, object]
+) -> np.ndarray:
+    """Distances (m) of points from their ``goals`` after these ``seconds``, with settings of LSC's mazes.
+
+    ``delay`` (µs) of messages; ``more``: limits, way and obstacles. The theorem holds in the flight.
+    """
+    swarm = Swarm(
+        starts,
+        Rough(delay=delay),
+        [Habits()] * len(starts),
+        1,
+        planar=True,
+        settings={"tube": 0.008, "drift": 0.008, "clock_us": 0, "d_min_obstacle": 0.15},
+        more={"field": {"d_min": 0.3, "d_safe": 1.5}, **more},
+    )
+    until = seconds * 1_000_000
+    swarm.run(until, lambda _since, system: goals[system - 1])
+    ends = np.array([one.plan(EPOCH + until).positions_m()[0] for one in swarm.vehicles])
+    assert swarm.faults() == []
+    off: np.ndarray = np.linalg.norm(ends - goals, axis=1)
+    return off
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("apart", [0.5, None])
 def test_committed_plans_meet_in_a_lane_and_all_arrive(apart: float | None) -> None:
     """Two vehicles at each side change sides; without ``way.lanes`` they stay where they meet."""
     starts = np.array([[-0.5, 0.0, 1.0], [-0.5, 0.5, 1.0], [4.0, 0.0, 1.0], [4.0, 0.5, 1.0]])
-    goals = starts[[3, 2, 1, 0]]
-    swarm = Swarm(
-        starts,
-        Rough(delay=20_000),
-        [Habits()] * 4,
-        1,
-        planar=True,
-        settings={"tube": 0.008, "drift": 0.008, "clock_us": 0, "d_min_obstacle": 0.15},
-        more={
-            "limits": LIMITS.model_copy(update={"v_max": (1.0, 1.0, 1.0)}),
-            "field": {"d_min": 0.3, "d_safe": 1.5},
-            "way": {"clearance": 0.0, "cell": 0.1, "lanes": apart},
-            "obstacles": [one.model_dump() for one in walls(SIDING)],
-        },
-    )
-    swarm.run(25_000_000, lambda _since, system: goals[system - 1])
-    ends = np.array([one.plan(EPOCH + 25_000_000).positions_m()[0] for one in swarm.vehicles])
-    off = np.linalg.norm(ends - goals, axis=1)
-    assert swarm.faults() == []
+    lane = {
+        "limits": LIMITS.model_copy(update={"v_max": (1.0, 1.0, 1.0)}),
+        "way": {"clearance": 0.0, "cell": 0.1, "lanes": apart},
+        "obstacles": [one.model_dump() for one in walls(SIDING)],
+    }
+    off = distances_from_goals(starts, starts[[3, 2, 1, 0]], 25, 20_000, lane)
     assert (off.max() < 0.1) == (apart is not None), off
 
 
@@ -352,24 +363,11 @@ def test_one_arrives_between_vehicles_that_stand_half_a_metre_apart() -> None:
     starts = goals.copy()
     starts[2] = (1.5, 0.5, 1.0)
     wall = Box(kind="box", at=(1.0, 2.5, 1.25), size=(0.5, 3.5, 2.5))
-    limits = LIMITS.model_copy(
-        update={"v_max": (1.0, 1.0, 1.0), "u_max": (2.0, 2.0, 1.0), "box_max": (4.5, 4.5, 2.5)}
-    )
-    swarm = Swarm(
-        starts,
-        Rough(delay=0),
-        [Habits()] * 5,
-        1,
-        planar=True,
-        settings={"tube": 0.008, "drift": 0.008, "clock_us": 0, "d_min_obstacle": 0.15},
-        more={
-            "limits": limits,
-            "field": {"d_min": 0.3, "d_safe": 1.5, "downwash": 2.0},
-            "way": {"clearance": 0.2, "cell": 0.1, "lanes": 0.5},
-            "obstacles": [wall.model_dump()],
-        },
-    )
-    swarm.run(15_000_000, lambda _since, system: goals[system - 1])
-    ends = np.array([one.plan(EPOCH + 15_000_000).positions_m()[0] for one in swarm.vehicles])
-    assert swarm.faults() == []
-    assert np.linalg.norm(ends - goals, axis=1).max() < 0.1
+    limits = {"v_max": (1.0, 1.0, 1.0), "u_max": (2.0, 2.0, 1.0), "box_max": (4.5, 4.5, 2.5)}
+    hall = {
+        "limits": LIMITS.model_copy(update=limits),
+        "field": {"d_min": 0.3, "d_safe": 1.5, "downwash": 2.0},
+        "way": {"clearance": 0.2, "cell": 0.1, "lanes": 0.5},
+        "obstacles": [wall.model_dump()],
+    }
+    assert distances_from_goals(starts, goals, 15, 0, hall).max() < 0.1
