@@ -138,13 +138,17 @@ class Bird:
 
     @property
     def pilot(self) -> int:
-        """The process that flies."""
-        last = [
-            event["text"]
+        """The process that flies; IndexError before the first has told its number."""
+        return self._pilots[-1]
+
+    @property
+    def _pilots(self) -> list[int]:
+        """The processes that have flown, the present one last."""
+        return [
+            int(event["text"].rpartition(" ")[2])
             for event in self.events
             if event["what"] == "process" and "in process" in event["text"]
         ]
-        return int(last[-1].rpartition(" ")[2])
 
     def signal_sitl(self, which: signal.Signals) -> None:
         """To all its processes."""
@@ -225,10 +229,10 @@ class Bird:
         return waits[-1] if waits else ""
 
     def weigh(self, seconds: float) -> None:
-        """Note the memory of both processes."""
-        if self._fly is None or self.parent.poll() is not None or not self.events:
+        """Note the memory of the parent, and of the process that flies if that has begun."""
+        if self._fly is None or self.parent.poll() is not None:
             return
-        for process in (self.parent.pid, self.pilot):
+        for process in (self.parent.pid, *self._pilots[-1:]):
             size = resident(process)
             if size is not None:
                 self.memory.setdefault(process, []).append((seconds, size))
