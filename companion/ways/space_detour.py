@@ -92,6 +92,12 @@ class SpaceDetour:
         self._next_search = 0
         self.enclosed = False
         """Whether the last search found no way."""
+        self.led = False
+        """Whether a way towards the present goal was found before or now.
+
+        Its line to the goal may be free again, beside those that rest: a goal that is turned aside there may
+        lead back to where there was no progress.
+        """
         self.begun = 0
         """Number of ways that were begun."""
         self.straight = False
@@ -106,11 +112,6 @@ class SpaceDetour:
             )
 
     @property
-    def follows(self) -> bool:
-        """Whether the last sub-goal is on a way."""
-        return self._way is not None
-
-    @property
     def narrow(self) -> bool:
         """Whether the vehicle has not got on for some time on ways that were found.
 
@@ -120,17 +121,26 @@ class SpaceDetour:
         return self._progress.waited > _STUCK_US
 
     def towards(
-        self, now: int, rest: Array, goal: Array, others: Callable[[], Balls], *, stalled: bool
+        self,
+        now: int,
+        rest: Array,
+        goal: Array,
+        others: Callable[[], Balls],
+        *,
+        stalled: bool,
+        stands: bool = False,
     ) -> Subgoal:
         """Return the sub-goal at ``now`` (µs) of a plan that ends at ``rest`` (3,) so far, towards ``goal``.
 
-        ``stalled``: there is no progress. ``others`` returns those that rest. Without a way it is the goal.
+        ``stands``: it has ended there for some time. ``stalled``: there is no progress for a longer time.
+        ``others`` returns those that rest. Without a way it is the goal.
         """
         self.straight = False
         if self._goal is not None and float(np.abs(goal - self._goal).max()) > _MOVED_M:
             self._forget()
+            self.led = False
         self._goal = goal
-        if self._way is None and self._search is None and not (stalled or self.enclosed):
+        if self._way is None and self._search is None and not (stands or stalled or self.enclosed):
             return Subgoal(goal, 0.0)
         balls = others()
         # What a way must keep of those that rest, except where the two ends are nearer.
@@ -196,5 +206,6 @@ class SpaceDetour:
                 self.enclosed = found is None
                 if found is not None:
                     self._way = along(found.corners, self._spacing)[1:]
+                    self.led = True
                     self.begun += 1
                 return

@@ -18,7 +18,7 @@ that turned with them would pass them on the far side, with the goal on the near
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import dist, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +36,8 @@ _MIN_PULL_DISTANCE_M = 0.5
 _MIN_GAIN_M = 0.05
 _REACHED_M = 0.1
 """Progress: the rest point is nearer to the goal than ``_REACHED_M``, or ``_MIN_GAIN_M`` nearer than ever."""
+_STANDS_S, _STANDS_M = 1.0, 0.25
+"""Time (s) for which the rest point stays within a distance (m) of one place before the plan stands."""
 _IN_VAIN_S = 5.0
 """Time (s) without progress after the turn may be ``bend_more``, after which it is given up."""
 
@@ -63,6 +65,8 @@ class DeadlockTurn:
         self._distance: float | None = None
         self._best = np.inf
         self._waited = 0.0
+        self._stood_at: Array | None = None
+        self._stood = 0.0
 
     def turned(self, position: Array, goal: Array, least: float = 0.0) -> Array:
         """Return the place (3,), m, to aim for from ``position`` (3,) instead of ``goal`` (3,).
@@ -91,6 +95,11 @@ class DeadlockTurn:
         return self._waited > self._full_after
 
     @property
+    def stands(self) -> bool:
+        """Whether the rest point has stayed at one place for some time, and that is not the goal."""
+        return self._stood >= _STANDS_S
+
+    @property
     def _full_after(self) -> float:
         """Time (s) without progress after which the turn may be ``bend_more``."""
         config = self._config
@@ -109,6 +118,7 @@ class DeadlockTurn:
     def restart(self) -> None:
         """Measure progress anew, because the way to the goal is another one."""
         self._distance, self._best = None, np.inf
+        self._stood_at, self._stood = None, 0.0
 
     def learn(
         self,
@@ -126,7 +136,7 @@ class DeadlockTurn:
         The plan ends at rest at ``rest`` (3,), m. ``pushes``: of its planes. ``gradient_per_metre``: the
         gradient of its cost per metre of error. The previous plan was made ``seconds`` ago. ``beyond`` (m):
         length of the way from ``goal``, if that is a sub-goal. ``moving``: the goal moves; the distance from
-        it then does not measure progress, and the turn stays below ``bend``.
+        it then does not measure progress, the turn stays below ``bend``, and the plan never stands.
         """
         config = self._config
         x, y, z = (goal - rest).tolist()
@@ -140,6 +150,15 @@ class DeadlockTurn:
             self._best, self._waited = min(distance, self._best), 0.0
         else:
             self._waited += seconds
+        if (
+            moving
+            or distance < _REACHED_M
+            or self._stood_at is None
+            or dist(rest, self._stood_at) > _STANDS_M
+        ):
+            self._stood_at, self._stood = rest.copy(), 0.0
+        else:
+            self._stood += seconds
         overtime = max(0.0, self._waited - config.patience)
         least = max(direct, 1e-6)
         direction = x / least, y / least, z / least

@@ -138,7 +138,7 @@ class PlanGoals:
             place = own[0, 0]
             # A sub-goal that is turned aside is not on the way any more, and may not be free.
             met = NOBODY if subgoal.beyond > 0.0 else met
-            if self._space is None or not self._space.follows or self._deadlock_turn.overtime:
+            if self._space is None or not self._space.led or self._deadlock_turn.overtime:
                 goal = self._deadlock_turn.turned(place, goal, met.angle)
             if met.ahead < inf:
                 goal = place + limit(goal - place, met.ahead)
@@ -175,7 +175,12 @@ class PlanGoals:
         stalled = self._deadlock_turn.stalled
         if self._space is not None:
             subgoal = self._space.towards(
-                now, rest, goal, lambda: self._obstacles.at_rest(epoch, self._agreements), stalled=stalled
+                now,
+                rest,
+                goal,
+                lambda: self._obstacles.at_rest(epoch, self._agreements),
+                stands=self._deadlock_turn.stands,
+                stalled=stalled,
             )
             if not self._space.enclosed:
                 self._detour.forget()

@@ -137,14 +137,14 @@ def test_without_a_stall_the_goal_is_the_goal_and_a_free_line_ends_a_way() -> No
     assert way is not None
     # Between two of the upper row.
     assert way[:, 2].max() > 1.2 + 2.0 * np.sqrt(D**2 - 0.25**2)
-    assert detour.follows
+    assert detour.led
     # It keeps to the way while this is free, also when there is progress again.
     place = aside.place
     after = detour.towards(1, place, GOAL, lambda: wall, stalled=False)
     assert np.linalg.norm(after.place - place) + after.beyond <= aside.beyond + 1e-9
     assert after.beyond < aside.beyond
     assert detour.towards(2, place, GOAL, lambda: NOBODY, stalled=False) == Subgoal(GOAL, 0.0)
-    assert not detour.follows
+    assert detour.led
     assert detour.towards(3, START, GOAL, lambda: wall, stalled=False) == Subgoal(GOAL, 0.0)
 
 

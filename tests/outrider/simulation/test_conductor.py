@@ -7,15 +7,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from companion.avoidance.certified.margins import between
+from companion.values.components import COMPONENT
 from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import CommandAck, Source
+from mavlink_bridge.node import Datagram
+from mavlink_bridge.wire.codec import Codec
 from outrider.runs.ground_truth import SAMPLE
 from outrider.scenarios.companion_settings import settings_of
 from outrider.scenarios.scenario import Scenario
 from outrider.scenarios.starts import starts
 from outrider.simulation.conductor import HOLD, Conductor, Observation, Stage
-from outrider.simulation.operator import Operator
+from outrider.simulation.operator import LINK, Operator
 from tests.outrider.shipped import scenario
 
 EPOCH = 1_000_000
@@ -237,6 +242,19 @@ def test_who_does_not_land_is_not_waited_for_for_ever() -> None:
     run = Run(GROUNDED)
     assert run.show(90.0, run.starts.positions)
     assert "not all vehicles were down" in (run.conductor.failure or "")
+
+
+def test_a_goal_that_a_companion_refuses_is_the_failure() -> None:
+    run = Run(AIRBORNE)
+    run.show(2.0, run.starts.positions)
+    denied = CommandAck(Source(12, COMPONENT), 192, mavlink.MAV_RESULT_DENIED, 0, 0, 255, 190)
+    run.operator.step(run.now, [Datagram(LINK, Codec().encode(denied))])
+    assert run.conductor.failure is None
+    assert run.show(20.0, run.starts.positions)
+    assert run.starts.goals is not None
+    east, north, up = run.starts.goals[1]
+    said = f"vehicle 12 refused the goal ({east:.3f}, {north:.3f}, {up:.3f}) m"
+    assert run.conductor.failure == said
 
 
 def test_an_abort_lands_and_keeps_the_first_reason() -> None:

@@ -57,6 +57,25 @@ def test_an_order_is_repeated_each_half_second_until_it_is_acknowledged() -> Non
     assert bench.operator.unanswered == []
 
 
+def test_a_goal_is_refused_until_it_is_accepted_or_another_one_is_ordered() -> None:
+    """Not by another result than a denial, nor by a late denial."""
+    bench, command = Bench(), mavlink.MAV_CMD_DO_REPOSITION
+    denied = ack(11, command, mavlink.MAV_RESULT_DENIED)
+    bench.operator.goal(11, np.zeros(3))
+    bench.run(0.1, ack(11, command, mavlink.MAV_RESULT_TEMPORARILY_REJECTED))
+    bench.run(0.1, ack(11, mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_RESULT_DENIED))
+    assert bench.operator.refused_goals == []
+    assert len(bench.run(1.0, denied)) == 2
+    assert bench.operator.refused_goals == [11]
+    bench.operator.goal(11, np.ones(3))
+    assert bench.operator.refused_goals == []
+    bench.run(0.1, denied)
+    assert bench.operator.refused_goals == [11]
+    bench.run(0.1, ack(11, command))
+    bench.run(0.1, denied)
+    assert bench.operator.refused_goals == []
+
+
 def test_it_says_what_was_ordered() -> None:
     bench = Bench()
     bench.operator.take_off(11, 4.5)

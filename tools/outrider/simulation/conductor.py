@@ -125,8 +125,8 @@ def _turning_speed(scenario: Scenario) -> float:
 class Conductor:
     """Sequence of the stages of one flight.
 
-    ``failure``: the reason if the clock never started, the flight was aborted, or a vehicle did not land in
-    time.
+    ``failure``: the reason if the clock never started, the flight was aborted, a companion refused its goal,
+    or a vehicle did not land in time.
     """
 
     def __init__(self, scenario: Scenario, starts: Starts, operator: Operator, epoch: int) -> None:
@@ -190,7 +190,8 @@ class Conductor:
                 self.stage = Stage.DONE
             elif sight.now - self._land_at > (cap := _LAND_CAPS[self._scenario.ending]):
                 order = self._scenario.ending
-                self.failure = f"not all vehicles were down {cap // 1_000_000} s after the order to {order}"
+                late = f"not all vehicles were down {cap // 1_000_000} s after the order to {order}"
+                self.failure = late if self.failure is None else f"{self.failure}; {late}"
                 self.stage = Stage.DONE
         return self.stage is Stage.DONE
 
@@ -272,10 +273,19 @@ class Conductor:
             over = now >= arrived_at + HOLD + _TIME_AFTER_CONVERGENCE_US
         if over:
             self.clock_end = now
+            self.failure = self._refusal()
             if self._scenario.airborne:
                 self.stage = Stage.DONE
             else:
                 self._land(now)
+
+    def _refusal(self) -> str | None:
+        """Return which companions refused which goals (m, ENU); None if none did."""
+        refused = [
+            f"vehicle {system} refused the goal ({', '.join(f'{x:.3f}' for x in self._ordered[system])}) m"
+            for system in self._operator.refused_goals
+        ]
+        return "; ".join(refused) or None
 
     def _arrived_at(self, start: int, since: int) -> int | None:
         """Return the time (µs) of the arrival that ends the flight; None while it has not come.

@@ -31,6 +31,7 @@ class Operator:
         self._source = Source(255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
         self._codec = Codec()
         self._open: dict[_Key, tuple[CommandInt | CommandLong, int]] = {}
+        self._denied: set[_Key] = set()
         self._now = 0
 
     def take_off(self, system: int, height: float) -> None:
@@ -72,13 +73,18 @@ class Operator:
         """System ids, sorted, that have not yet accepted an order."""
         return sorted({system for system, _ in self._open})
 
+    @property
+    def refused_goals(self) -> list[int]:
+        """System ids, sorted, whose companions denied the last goal and have not accepted it since."""
+        return sorted(s for s, command in self._denied if command == mavlink.MAV_CMD_DO_REPOSITION)
+
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Remove accepted orders; send the new ones, and repeat those that are due."""
         self._now = now
         for datagram in inbox:
             for message in self._codec.feed(datagram.data):
-                if isinstance(message, CommandAck) and message.result == mavlink.MAV_RESULT_ACCEPTED:
-                    self._open.pop((message.source.system, message.command), None)
+                if isinstance(message, CommandAck):
+                    self._learn((message.source.system, message.command), message.result)
         out = []
         for key, (order, due) in self._open.items():
             if now >= due:
@@ -86,5 +92,15 @@ class Operator:
                 self._open[key] = (order, now + _RETRY_PERIOD_US)
         return out
 
+    def _learn(self, key: _Key, result: int) -> None:
+        """Note an answer; late ones of an order that was accepted or withdrawn change nothing."""
+        if result == mavlink.MAV_RESULT_ACCEPTED:
+            self._open.pop(key, None)
+            self._denied.discard(key)
+        elif result == mavlink.MAV_RESULT_DENIED and key in self._open:
+            self._denied.add(key)
+
     def _order(self, order: CommandInt | CommandLong) -> None:
-        self._open[order.target_system, order.command] = (order, self._now)
+        key = order.target_system, order.command
+        self._open[key] = (order, self._now)
+        self._denied.discard(key)
