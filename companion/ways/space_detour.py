@@ -1,12 +1,12 @@
-"""Detour in space: a way past others that rest, over and under them, for a vehicle that makes no progress.
+"""Detour in space: a way past others that rest, over and under them, for a vehicle whose plan stands.
 
 Vehicles that have arrived may stand around the place where another one waits, or around its goal, with room
-between them in space only. Then a vehicle that makes no progress searches the shortest way on a grid of the
-box, past others that rest and past fixed obstacles, with less and less room. While the rest of the way is
-free of those that rest, it aims at about the furthest place of it that the end of its plan sees, until it
-sees the goal. A search is spread over plans, in parts that do not depend on the speed of the computer. Where
-two vehicles rest on the ways of each other, each goes round the other one on its own way. Only the cost of
-plans changes.
+between them in space only. Then a vehicle whose plan has ended at one place for some time searches the
+shortest way on a grid of the box, past others that rest and past fixed obstacles, with less and less room.
+While the rest of the way is free of those that rest, it aims at about the furthest place of it that the end
+of its plan sees, until it sees the goal. A search is spread over plans, in parts that do not depend on the
+speed of the computer. Where two vehicles rest on the ways of each other, each goes round the other one on its
+own way. Only the cost of plans changes.
 """
 
 from __future__ import annotations

@@ -144,8 +144,24 @@ def test_without_a_stall_the_goal_is_the_goal_and_a_free_line_ends_a_way() -> No
     assert np.linalg.norm(after.place - place) + after.beyond <= aside.beyond + 1e-9
     assert after.beyond < aside.beyond
     assert detour.towards(2, place, GOAL, lambda: NOBODY, stalled=False) == Subgoal(GOAL, 0.0)
+    # That it was led there counts on the rest of its way, and not on the way to another goal.
     assert detour.led
     assert detour.towards(3, START, GOAL, lambda: wall, stalled=False) == Subgoal(GOAL, 0.0)
+    assert detour.led
+    other = GOAL + np.array([0.6, 0.0, 0.0])
+    assert detour.towards(4, START, other, lambda: wall, stalled=False) == Subgoal(other, 0.0)
+    assert not detour.led
+
+
+def test_a_plan_that_stands_searches_a_way_before_there_is_no_progress_for_long() -> None:
+    detour = SpaceDetour((), LIMITS, D, D, ROOM)
+    for plan in range(20):
+        detour.towards(200_000 * plan, START, GOAL, lambda: resting(WALL), stands=True, stalled=False)
+    assert detour.begun == 1
+    # Where nobody rests on the line there is nothing to search, and the turn is not given up.
+    detour = SpaceDetour((), LIMITS, D, D, ROOM)
+    assert detour.towards(0, START, GOAL, lambda: NOBODY, stands=True, stalled=False) == Subgoal(GOAL, 0.0)
+    assert not detour.straight
 
 
 def test_a_way_that_is_closed_is_searched_anew_without_a_stall() -> None:
@@ -215,7 +231,7 @@ def flown(starts: Array, goals: Array, limits: LimitsConfig, seconds: int) -> fl
 
 
 def test_a_vehicle_arrives_behind_a_wall_of_vehicles_that_rest() -> None:
-    assert flown(np.vstack([START, WALL]), np.vstack([GOAL, WALL]), LIMITS, 16) < 0.05
+    assert flown(np.vstack([START, WALL]), np.vstack([GOAL, WALL]), LIMITS, 9) < 0.05
 
 
 def test_two_that_meet_head_on_in_a_tube_pass_each_other() -> None:
@@ -224,7 +240,7 @@ def test_two_that_meet_head_on_in_a_tube_pass_each_other() -> None:
         u_max=(2.0, 2.0, 1.0), v_max=(1.0, 1.0, 1.0), box_min=(-1.5, -0.05, 0.5), box_max=(1.5, 0.05, 2.5)
     )
     starts = np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0]])
-    assert flown(starts, starts[::-1], tube, 16) < 0.05
+    assert flown(starts, starts[::-1], tube, 9) < 0.05
 
 
 def test_heights_of_landed_vehicles_and_columns_do_not_count_as_those_of_others_do() -> None:

@@ -33,3 +33,25 @@ def test_nobody_turns_to_the_side_to_which_the_other_flies_ahead(sense: float) -
 
 def test_the_others_that_push_count_all_the_same() -> None:
     assert turned(2.0 * (AHEAD + RIGHT), np.zeros(3)) == turned(np.zeros(3))
+
+
+def stands(step: np.ndarray, *, goal: np.ndarray = GOAL, moving: bool = False, seconds: float = 3.0) -> bool:
+    """Whether a plan whose end moves by ``step`` in each second stands after some seconds."""
+    turn = DeadlockTurn(DeadlockConfig())
+    nobody = Pushes(np.empty((0, 3)), np.empty((0, 3)))
+    for k in range(round(5 * seconds) + 1):
+        turn.learn(REST + 0.2 * k * step, goal, nobody, 1.0, 0.2, moving=moving)
+    return turn.stands
+
+
+def test_a_plan_stands_whose_end_stays_about_one_place_that_is_not_the_goal() -> None:
+    still = np.zeros(3)
+    assert stands(still)
+    assert stands(still, seconds=1.0)
+    assert not stands(still, seconds=0.8)
+    # Progress of some centimetres in a second counts as none, and aside counts as on.
+    assert stands(0.08 * AHEAD)
+    assert not stands(0.5 * AHEAD)
+    assert not stands(0.5 * RIGHT)
+    assert not stands(still, goal=REST)
+    assert not stands(still, moving=True)
