@@ -24,6 +24,7 @@ class Tally(NamedTuple):
 
     ``plans`` that were made, and how many of them with ``relaxed`` bounds; ``solver_failures``; ``held``: how
     often an old plan was kept; ``anchored_anew``: how often planning restarted at the measured position.
+    ``left_tube``: how often the vehicle left the tube of its committed plan.
     ``plan_ns``: stopwatch reading (ns) of each attempt to plan, clipped to 4.29 s. ``plan_at``: time (µs on
     the companion's clock) of the step that made the attempt. ``fusion``: of detections.
     """
@@ -36,6 +37,7 @@ class Tally(NamedTuple):
     plan_ns: Sequence[int]
     plan_at: Sequence[int] = ()
     fusion: FusionTally = FusionTally()
+    left_tube: int = 0
 
 
 class AvoidanceInputs(NamedTuple):

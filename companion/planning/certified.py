@@ -75,7 +75,7 @@ class CertifiedAvoidance:
         commitment, times = self._flight.commitment, self._times
         failures = commitment.held[HoldReason.UNSOLVED]
         counts = self._plans, 0, failures, self.held, commitment.anchored_anew
-        return Tally(*counts, times.plan_ns[:], times.plan_at[:])
+        return Tally(*counts, times.plan_ns[:], times.plan_at[:], left_tube=self._flight.tube.left)
 
     def refused(self, now: int) -> RefusedSenders:
         """Return the senders whose committed plans are refused at ``now`` (µs)."""

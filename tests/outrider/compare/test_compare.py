@@ -34,7 +34,8 @@ def flight(**changes: Any) -> dict[str, Any]:
         "separation_m": 0.5,
         "obstacle_m": None,
     }
-    found |= {"held_epochs": 0, "solver_failures": 0, "d_min_violations": 0, "processor": "one"}
+    found |= {"held_epochs": 0, "solver_failures": 0, "d_min_violations": 0, "left_tube": 0}
+    found |= {"processor": "one"}
     return {**found, "failure": None, **changes}
 
 

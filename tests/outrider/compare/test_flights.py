@@ -21,6 +21,8 @@ def test_vehicles_cross_a_box_apart_in_the_ellipsoid() -> None:
     assert found["arrived"] == found["vehicles"] == 5
     assert found["separation_m"] >= comparison.measure.least
     assert found["d_min_violations"] == found["solver_failures"] == 0
+    # Its tubes of 1 mm hold what companions know of the positions of points.
+    assert found["left_tube"] == 0
     assert found["most_acceleration"] <= 2.0
     assert found["jerk2"] is None
     assert 0.0 < found["mean_s"] <= found["last_s"] < 60.0

@@ -61,6 +61,7 @@ def _planning(outcome: Outcome) -> dict[str, Any]:
         "plans": sum(after.plans - before.plans for before, after in tallies),
         "held_epochs": sum(after.held - before.held for before, after in tallies),
         "solver_failures": sum(after.solver_failures for _, after in tallies),
+        "left_tube": sum(after.left_tube - before.left_tube for before, after in tallies),
         "anchored_anew": sum(after.anchored_anew - before.anchored_anew for before, after in tallies),
     }
 

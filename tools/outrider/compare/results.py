@@ -21,7 +21,8 @@ class Result:
     flights, ``last_s`` the mean over flights of the last arrival, ``worst_s`` the longest. ``separation_m``:
     least of all flights in the scene's measure; ``obstacle_m``: least from a surface. ``plan_ms_p50``,
     ``plan_ms_p99``: medians of the flights, measured on ``processors``. ``violations``: number of times that
-    two vehicles came nearer than the scenario's own d_min.
+    two vehicles came nearer than the scenario's own d_min. ``left_tube``: number of times that a vehicle left
+    the tube of its plan.
     """
 
     row: str
@@ -50,6 +51,7 @@ class Result:
     held_epochs: int
     solver_failures: int
     violations: int
+    left_tube: int
     delay_ms: float
     loss: float
     reaches_bar: bool | None
@@ -107,6 +109,7 @@ def result_of(
         held_epochs=sum(one["held_epochs"] for one in flights),
         solver_failures=sum(one["solver_failures"] for one in flights),
         violations=sum(one["d_min_violations"] for one in flights),
+        left_tube=sum(one["left_tube"] for one in flights),
         delay_ms=float(links["swarm"]["delay_ms"]),
         loss=float(links["swarm"]["loss"]),
         reaches_bar=None,

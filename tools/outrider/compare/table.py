@@ -27,6 +27,7 @@ _HEADS = (
     "j, m/s³",
     "stops",
     "own d_min",
+    "tube",
     "plan, ms",
     "bar",
 )
@@ -57,7 +58,8 @@ def caption(comparison: Comparison) -> str:
     return (
         f"success: all arrive {limits} ({measure.kind}); mean over vehicles; all: last arrival, mean over"
         " flights; worst: last arrival of all flights; j: largest jerk on an axis; own d_min: times that two"
-        " vehicles came nearer than our scenario's; plan: CPU time, p50 / p99, theirs as published; delay and"
+        " vehicles came nearer than our scenario's; tube: times that a vehicle left that of its plan, after"
+        " which all keep more distance for a while; plan: CPU time, p50 / p99, theirs as published; delay and"
         f" loss: of messages between vehicles; {_NOTHING}: not published, or does not exist"
     )
 
@@ -112,6 +114,7 @@ def lines(comparison: Comparison, result: Result) -> Iterator[tuple[str, ...]]:
         _number(result.most_jerk, 1),
         _number(result.stops, 2),
         str(result.violations),
+        str(result.left_tube),
         f"{_number(result.plan_ms_p50, 2)} / {_number(result.plan_ms_p99, 2)}",
         _bar(bars.get(result.row), result.reaches_bar),
     )
@@ -133,6 +136,7 @@ def _published(one: Published) -> tuple[str, ...]:
         _number(one.jerk2, 0),
         _NOTHING,
         _number(one.stops, 2),
+        "",
         "",
         _number(one.plan_ms, 1),
         "",

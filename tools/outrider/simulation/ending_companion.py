@@ -53,6 +53,7 @@ class EndingCompanion:
             before.anchored_anew + now.anchored_anew,
             [*before.plan_ns, *now.plan_ns],
             [*before.plan_at, *now.plan_at],
+            left_tube=before.left_tube + now.left_tube,
         )
 
     @property
