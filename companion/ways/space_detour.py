@@ -92,12 +92,7 @@ class SpaceDetour:
         self._next_search = 0
         self.enclosed = False
         """Whether the last search found no way."""
-        self.led = False
-        """Whether a way towards the present goal was found before or now.
-
-        Its line to the goal may be free again, beside those that rest: a goal that is turned aside there may
-        lead back to where there was no progress.
-        """
+        self._led_to: Array | None = None
         self.begun = 0
         """Number of ways that were begun."""
         self.straight = False
@@ -110,6 +105,15 @@ class SpaceDetour:
             self._clear = clearance_of(
                 self._obstacles, self._limits, self._cell, _MOST_CELLS, self._clearances[0]
             )
+
+    @property
+    def led(self) -> bool:
+        """Whether a way to the present goal has been found.
+
+        It stays True when the line to the goal is free again, because a turn there may lead the vehicle back.
+        """
+        goal, to = self._goal, self._led_to
+        return goal is not None and to is not None and float(np.abs(goal - to).max()) <= _MOVED_M
 
     @property
     def narrow(self) -> bool:
@@ -127,8 +131,8 @@ class SpaceDetour:
         goal: Array,
         others: Callable[[], Balls],
         *,
+        stands: bool,
         stalled: bool,
-        stands: bool = False,
     ) -> Subgoal:
         """Return the sub-goal at ``now`` (µs) of a plan that ends at ``rest`` (3,) so far, towards ``goal``.
 
@@ -138,7 +142,6 @@ class SpaceDetour:
         self.straight = False
         if self._goal is not None and float(np.abs(goal - self._goal).max()) > _MOVED_M:
             self._forget()
-            self.led = False
         self._goal = goal
         if self._way is None and self._search is None and not (stands or stalled or self.enclosed):
             return Subgoal(goal, 0.0)
@@ -206,6 +209,6 @@ class SpaceDetour:
                 self.enclosed = found is None
                 if found is not None:
                     self._way = along(found.corners, self._spacing)[1:]
-                    self.led = True
+                    self._led_to = goal
                     self.begun += 1
                 return

@@ -22,7 +22,7 @@ def test_its_companions_have_the_settings_of_the_shipped_files(name: str) -> Non
 
 
 CALM = [
-    # The mixed ones are of both kinds: these two, of three minutes each, do not fit into CI with them.
+    # Three minutes each; in CI the mixed flight covers both firmwares.
     pytest.param(of(5), 5, id="five ArduCopters", marks=pytest.mark.soak),
     pytest.param(of(5, flavour="px4"), 6, id="five PX4s", marks=pytest.mark.soak),
     pytest.param(of(8, flavour="ardupilot,px4"), 7, id="eight mixed"),

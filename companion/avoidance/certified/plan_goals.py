@@ -138,7 +138,7 @@ class PlanGoals:
             place = own[0, 0]
             # A sub-goal that is turned aside is not on the way any more, and may not be free.
             met = NOBODY if subgoal.beyond > 0.0 else met
-            if self._space is None or not self._space.led or self._deadlock_turn.overtime:
+            if moving or not self._led or self._deadlock_turn.overtime:
                 goal = self._deadlock_turn.turned(place, goal, met.angle)
             if met.ahead < inf:
                 goal = place + limit(goal - place, met.ahead)
@@ -150,7 +150,7 @@ class PlanGoals:
         That is the way around fixed obstacles, and a detour on it around what rests.
         """
         way, stalled = self._way, self._deadlock_turn.stalled
-        begun = self._begun()
+        begun, led = self._begun(), self._led
         if way is not None and stalled:
             way.go_round(now, lambda: self._obstacles.at_rest(epoch, self._agreements))
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
@@ -164,7 +164,8 @@ class PlanGoals:
         if self._straight:
             self._deadlock_turn.give_up()
         if self._begun() != begun:
-            self._restart(rest, counts=stalled or (way is not None and way.goes_round))
+            first = self._led and not led
+            self._restart(rest, counts=stalled or first or (way is not None and way.goes_round))
         return Subgoal(subgoal.place, subgoal.beyond + goal.beyond)
 
     def _past_others(self, now: int, epoch: int, rest: Array, goal: Array) -> Subgoal:
@@ -194,6 +195,11 @@ class PlanGoals:
         )
 
     @property
+    def _led(self) -> bool:
+        """Whether a way in space to the present goal has been found."""
+        return self._space is not None and self._space.led
+
+    @property
     def _straight(self) -> bool:
         """Whether the line to the goal, or to the next place of the way, is free without progress."""
         return self._detour.straight or (self._space is not None and self._space.straight)
@@ -214,7 +220,7 @@ class PlanGoals:
 
         Where a way is lost and found again at the same place, as at a corner of an obstacle beside which
         somebody rests, or in a gap that opens and closes, that is no progress. It ``counts`` in any case if
-        it was searched because there was none.
+        it was searched because there was none, or is the first in space to its goal.
         """
         if counts or self._began_at is None or float(np.abs(rest - self._began_at).max()) > _MOVED_M:
             self._began_at = rest.copy()

@@ -51,7 +51,7 @@ def off(points: Array, balls: Balls) -> Array:
 def followed(detour: SpaceDetour, start: Array, goal: Array, balls: Balls) -> tuple[Subgoal, Array | None]:
     """The first sub-goal after a whole search, and the way from the start; None without one."""
     for plan in range(500):
-        found = detour.towards(200_000 * plan, start, goal, lambda: balls, stalled=True)
+        found = detour.towards(200_000 * plan, start, goal, lambda: balls, stands=True, stalled=True)
         if detour.begun:
             assert detour._way is not None
             return found, np.vstack([start, detour._way])
@@ -132,7 +132,7 @@ def test_over_a_landed_vehicle_or_a_post_there_is_no_way() -> None:
 
 def test_without_a_stall_the_goal_is_the_goal_and_a_free_line_ends_a_way() -> None:
     detour, wall = SpaceDetour((), LIMITS, D, D, ROOM), resting(WALL)
-    assert detour.towards(0, START, GOAL, lambda: wall, stalled=False) == Subgoal(GOAL, 0.0)
+    assert detour.towards(0, START, GOAL, lambda: wall, stands=False, stalled=False) == Subgoal(GOAL, 0.0)
     aside, way = followed(detour, START, GOAL, wall)
     assert way is not None
     # Between two of the upper row.
@@ -140,16 +140,23 @@ def test_without_a_stall_the_goal_is_the_goal_and_a_free_line_ends_a_way() -> No
     assert detour.led
     # It keeps to the way while this is free, also when there is progress again.
     place = aside.place
-    after = detour.towards(1, place, GOAL, lambda: wall, stalled=False)
+    after = detour.towards(1, place, GOAL, lambda: wall, stands=False, stalled=False)
     assert np.linalg.norm(after.place - place) + after.beyond <= aside.beyond + 1e-9
     assert after.beyond < aside.beyond
-    assert detour.towards(2, place, GOAL, lambda: NOBODY, stalled=False) == Subgoal(GOAL, 0.0)
+    assert detour.towards(2, place, GOAL, lambda: NOBODY, stands=False, stalled=False) == Subgoal(GOAL, 0.0)
     # That it was led there counts on the rest of its way, and not on the way to another goal.
     assert detour.led
-    assert detour.towards(3, START, GOAL, lambda: wall, stalled=False) == Subgoal(GOAL, 0.0)
+    assert detour.towards(3, START, GOAL, lambda: wall, stands=False, stalled=False) == Subgoal(GOAL, 0.0)
+    assert detour.led
+    # Nor on the way to one that it has become in small steps.
+    for step in range(1, 7):
+        other = GOAL + np.array([0.1 * step, 0.0, 0.0])
+        detour.towards(3 + step, START, other, lambda: NOBODY, stands=False, stalled=False)
+    assert not detour.led
+    detour.towards(10, START, GOAL, lambda: wall, stands=False, stalled=False)
     assert detour.led
     other = GOAL + np.array([0.6, 0.0, 0.0])
-    assert detour.towards(4, START, other, lambda: wall, stalled=False) == Subgoal(other, 0.0)
+    assert detour.towards(11, START, other, lambda: wall, stands=False, stalled=False) == Subgoal(other, 0.0)
     assert not detour.led
 
 
@@ -175,7 +182,7 @@ def test_a_way_that_is_closed_is_searched_anew_without_a_stall() -> None:
     gap = np.array([[0.0, side * 1.0, z] for z in (0.5, 1.2, 1.9, 2.5)])
     closed = resting(np.vstack([wall, gap]))
     for plan in range(20, 60):
-        detour.towards(200_000 * plan, START, GOAL, lambda: closed, stalled=False)
+        detour.towards(200_000 * plan, START, GOAL, lambda: closed, stands=False, stalled=False)
         if detour.begun == 2:
             break
     assert detour.begun == 2
@@ -190,7 +197,7 @@ def test_a_way_on_which_a_vehicle_does_not_get_on_counts_as_narrow() -> None:
     assert way is not None
 
     def step(tenths: int, rest: Array, goal: Array = GOAL) -> None:
-        detour.towards(100_000_000 + 100_000 * tenths, rest, goal, lambda: wall, stalled=False)
+        detour.towards(100_000_000 + 100_000 * tenths, rest, goal, lambda: wall, stands=False, stalled=False)
 
     places = along(way)[: len(along(way)) // 4]
     for tenths in range(80):

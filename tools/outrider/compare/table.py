@@ -58,9 +58,9 @@ def caption(comparison: Comparison) -> str:
     return (
         f"success: all arrive {limits} ({measure.kind}); mean over vehicles; all: last arrival, mean over"
         " flights; worst: last arrival of all flights; j: largest jerk on an axis; own d_min: times that two"
-        " vehicles came nearer than our scenario's; tube: times that a vehicle left that of its plan, after"
-        " which all keep more distance for a while; plan: CPU time, p50 / p99, theirs as published; delay and"
-        f" loss: of messages between vehicles; {_NOTHING}: not published, or does not exist"
+        " vehicles came nearer than our scenario's; tube: times that a vehicle left the tube of its plan,"
+        " after which all keep more distance for a while; plan: CPU time, p50 / p99, theirs as published;"
+        f" delay and loss: of messages between vehicles; {_NOTHING}: not published, or does not exist"
     )
 
 

@@ -105,7 +105,7 @@ def summarise(flight: Outcome, cost: Cost, run_dir: Path | None) -> dict[str, Va
         "lateness_ms": None
         if late is None
         else {"p50": round(late.p50_ms, 3), "p99": round(late.p99_ms, 3), "max": round(late.max_ms, 3)},
-        "failure": flight.failure or first_fall(flight),
+        "failure": "; ".join(filter(None, (flight.failure, first_fall(flight)))) or None,
         "simulated_s": round(simulated, 3),
         "wall_s": round(cost.wall, 3),
         "cpu_s": round(cost.cpu, 3),

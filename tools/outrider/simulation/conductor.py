@@ -273,19 +273,11 @@ class Conductor:
             over = now >= arrived_at + HOLD + _TIME_AFTER_CONVERGENCE_US
         if over:
             self.clock_end = now
-            self.failure = self._refusal()
+            self.failure = self._operator.refusal(self._ordered)
             if self._scenario.airborne:
                 self.stage = Stage.DONE
             else:
                 self._land(now)
-
-    def _refusal(self) -> str | None:
-        """Return which companions refused which goals (m, ENU); None if none did."""
-        refused = [
-            f"vehicle {system} refused the goal ({', '.join(f'{x:.3f}' for x in self._ordered[system])}) m"
-            for system in self._operator.refused_goals
-        ]
-        return "; ".join(refused) or None
 
     def _arrived_at(self, start: int, since: int) -> int | None:
         """Return the time (µs) of the arrival that ends the flight; None while it has not come.

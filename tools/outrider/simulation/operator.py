@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,14 @@ class Operator:
     def refused_goals(self) -> list[int]:
         """System ids, sorted, whose companions denied the last goal and have not accepted it since."""
         return sorted(s for s, command in self._denied if command == mavlink.MAV_CMD_DO_REPOSITION)
+
+    def refusal(self, goals: Mapping[int, NDArray[np.float64]]) -> str | None:
+        """Return which companions refused which of the ``goals`` (3,), m, by system id; None if none did."""
+        refused = [
+            f"vehicle {system} refused the goal ({', '.join(f'{x:.3f}' for x in goals[system])}) m"
+            for system in self.refused_goals
+        ]
+        return "; ".join(refused) or None
 
     def step(self, now: int, inbox: Sequence[Datagram]) -> list[Datagram]:
         """Remove accepted orders; send the new ones, and repeat those that are due."""
