@@ -113,7 +113,7 @@ class SpaceDetour:
         It stays True when the line to the goal is free again, because a turn there may lead the vehicle back.
         """
         goal, to = self._goal, self._led_to
-        return goal is not None and to is not None and float(np.abs(goal - to).max()) <= _MOVED_M
+        return goal is not None and to is not None and not _moved(to, goal)
 
     @property
     def narrow(self) -> bool:
@@ -140,7 +140,7 @@ class SpaceDetour:
         ``others`` returns those that rest. Without a way it is the goal.
         """
         self.straight = False
-        if self._goal is not None and float(np.abs(goal - self._goal).max()) > _MOVED_M:
+        if self._goal is not None and _moved(self._goal, goal):
             self._forget()
         self._goal = goal
         if self._way is None and self._search is None and not (stands or stalled or self.enclosed):
@@ -183,7 +183,7 @@ class SpaceDetour:
 
     def _follows(self, least: Balls, rest: Array, goal: Array) -> bool:
         """Return whether the way still leads to ``goal`` (3,), m; drop the places that lie behind."""
-        if self._way is None or float(np.abs(self._way[-1] - goal).max()) > _MOVED_M:
+        if self._way is None or _moved(self._way[-1], goal):
             return False
         seen = np.flatnonzero(self._free(least, rest, self._way[:_LOOKED]))
         if not len(seen):
@@ -212,3 +212,8 @@ class SpaceDetour:
                     self._led_to = goal
                     self.begun += 1
                 return
+
+
+def _moved(goal: Array, now: Array) -> bool:
+    """Return whether a ``goal`` (3,), m, that is ``now`` (3,) elsewhere counts as another one."""
+    return float(np.abs(now - goal).max()) > _MOVED_M

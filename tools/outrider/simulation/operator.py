@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,17 @@ _RETRY_PERIOD_US = 500_000
 _Key = tuple[int, int]
 
 
+class _Open(NamedTuple):
+    """Order that its companion has not accepted; it is sent again at ``due`` (µs).
+
+    ``denied``: whether the companion has denied it.
+    """
+
+    order: CommandInt | CommandLong
+    due: int
+    denied: bool = False
+
+
 class Operator:
     """Ground station that repeats every order each half second until the companion accepts it."""
 
@@ -30,8 +42,7 @@ class Operator:
         self._fleet = fleet
         self._source = Source(255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
         self._codec = Codec()
-        self._open: dict[_Key, tuple[CommandInt | CommandLong, int]] = {}
-        self._denied: set[_Key] = set()
+        self._open: dict[_Key, _Open] = {}
         self._now = 0
 
     def take_off(self, system: int, height: float) -> None:
@@ -76,7 +87,8 @@ class Operator:
     @property
     def refused_goals(self) -> list[int]:
         """System ids, sorted, whose companions denied the last goal and have not accepted it since."""
-        return sorted(s for s, command in self._denied if command == mavlink.MAV_CMD_DO_REPOSITION)
+        goal = mavlink.MAV_CMD_DO_REPOSITION
+        return sorted(s for (s, command), one in self._open.items() if command == goal and one.denied)
 
     def refusal(self, goals: Mapping[int, NDArray[np.float64]]) -> str | None:
         """Return which companions refused which of the ``goals`` (3,), m, by system id; None if none did."""
@@ -94,21 +106,18 @@ class Operator:
                 if isinstance(message, CommandAck):
                     self._learn((message.source.system, message.command), message.result)
         out = []
-        for key, (order, due) in self._open.items():
-            if now >= due:
-                out.append(Datagram(LINK, self._codec.encode(order)))
-                self._open[key] = (order, now + _RETRY_PERIOD_US)
+        for key, one in self._open.items():
+            if now >= one.due:
+                out.append(Datagram(LINK, self._codec.encode(one.order)))
+                self._open[key] = one._replace(due=now + _RETRY_PERIOD_US)
         return out
 
     def _learn(self, key: _Key, result: int) -> None:
         """Note an answer; late ones of an order that was accepted or withdrawn change nothing."""
         if result == mavlink.MAV_RESULT_ACCEPTED:
             self._open.pop(key, None)
-            self._denied.discard(key)
         elif result == mavlink.MAV_RESULT_DENIED and key in self._open:
-            self._denied.add(key)
+            self._open[key] = self._open[key]._replace(denied=True)
 
     def _order(self, order: CommandInt | CommandLong) -> None:
-        key = order.target_system, order.command
-        self._open[key] = (order, self._now)
-        self._denied.discard(key)
+        self._open[order.target_system, order.command] = _Open(order, self._now)
