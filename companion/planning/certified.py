@@ -81,7 +81,7 @@ class CertifiedAvoidance:
         """Return the senders whose committed plans are refused at ``now`` (µs)."""
         agreements = self._flight.agreements
         refused = agreements.refused_senders(now)
-        wrong = self._flight.clocks.wrong & agreements.members
+        wrong = self._flight.clocks.wrong & agreements.peers.members
         return refused._replace(wrong_clock=tuple(sorted(wrong.union(refused.wrong_clock))))
 
     def shed(self) -> None:

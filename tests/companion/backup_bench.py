@@ -142,8 +142,8 @@ def accepted(bench: Bench, system: int, since: int) -> bool:
             agreements.receive_plan(bench.now, SYSTEM, message.payload)
         else:
             agreements.receive_statement(bench.now, SYSTEM, unpack_statement(message.payload))
-    if SYSTEM not in agreements.left:
+    if SYSTEM not in agreements.peers.left:
         return False
     end = horizon_of(bench.plans[-1]).at(bench.now).position
-    assert np.allclose(agreements.left[SYSTEM].controls[-1, 2], end, atol=1e-9)
+    assert np.allclose(agreements.peers.left[SYSTEM].controls[-1, 2], end, atol=1e-9)
     return True

@@ -65,4 +65,4 @@ def test_a_plan_is_finished_and_the_others_fly_on(time: dict[str, Any], tmp_path
         avoidance = companion.avoidance
         assert isinstance(avoidance, CertifiedAvoidance)
         if k != FINISHING:
-            assert system in avoidance._flight.agreements.left
+            assert system in avoidance._flight.agreements.peers.left

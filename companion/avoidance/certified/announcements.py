@@ -53,7 +53,7 @@ class Announcements:
         if not new and now < self.next_at:
             return [] if farewell else self._statements(announced.epoch, outside, every=False)
         if new:
-            self._repetition.update(now, self._agreements.received(now, EPOCHS))
+            self._repetition.update(now, self._agreements.peers.received(now, EPOCHS))
             self._unsent = self._commitment.announced_until
         self._commitment.announced_until = announced.epoch
         self.next_at = now + self._repetition.period

@@ -60,18 +60,18 @@ class ConstraintSources:
         plan aims.
         """
         begins = epoch + self._config.certified.epoch_us
-        left = agreements.left
+        left = agreements.peers.left
         aside = self._departed.beside_last_plan(now, left, world)
         # A vehicle that said farewell may drift while it descends. One that is further than ``between`` from
         # its last plan may be flown by another controller, at any height: it counts as non-cooperative while
         # it sends. Once it is silent it counts as landed at its last position, as it may be switched off.
         taken_over = {system for system, (off, _, fresh) in aside.items() if fresh and off > self.between}
-        members: Set[int] = agreements.members
+        members: Set[int] = agreements.peers.members
         if left:
             members = members | (left.keys() - taken_over)
-        if away := agreements.away:
+        if away := agreements.peers.away:
             members = members - away
-        if distant := agreements.distant:
+        if distant := agreements.peers.distant:
             members = members | self._beyond_range(distant, world)
         seen = self._noncooperative.seen(begins, members, world)
         strangers = self._noncooperative.balls(seen, own)

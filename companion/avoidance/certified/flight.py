@@ -259,7 +259,7 @@ class CertifiedFlight:
         self.reservation.watch(now)
         if not turned:
             return False
-        wrong = not self.clocks.wrong.isdisjoint(self.agreements.members)
+        wrong = not self.clocks.wrong.isdisjoint(self.agreements.peers.members)
         if wrong or self.agreements.missing() or self._listens(now):
             if self.commitment.last_call(now):
                 self._told.ask_no_room()
@@ -336,13 +336,15 @@ class CertifiedFlight:
         start = commitment.start()
         own = commitment.own()
         epoch = commitment.epoch(now)
-        destination = self._places.destination(now, epoch, own[-1, 2], aim, self.agreements)
+        destination = self._places.destination(now, epoch, own[-1, 2], aim, self.agreements.peers)
         given = aim.given and destination is aim.destination
         moving = aim.path is not None
         subgoal, goal = self._goals.chosen(now, epoch, start, own, destination, given=given, moving=moving)
         others, field = self._sources.around(now, epoch, own, goal, self.agreements, world, view)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
-        return commitment.replan(objective, subgoal, others, max(self.tube.outside, self.agreements.outside))
+        return commitment.replan(
+            objective, subgoal, others, max(self.tube.outside, self.agreements.peers.outside)
+        )
 
     def _objective(self, begins: float, aim: Aim, goal: Array, field: Array) -> Objective:
         """Return the preferred places of a plan that begins in ``begins`` s and should end at ``goal`` (3,).

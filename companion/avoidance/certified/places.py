@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.free_place import covered, free_place
+from companion.avoidance.certified.peers import Peers
 from companion.avoidance.certified.surface_places import Candidate, Taken, place_of
 from companion.avoidance.certified.told_goals import ToldGoals
 from companion.avoidance.certified.way_obstacles import BESIDE_M, WayObstacles
@@ -36,18 +36,18 @@ class Places:
         self._low, self._high = np.array(limits.box_min), np.array(limits.box_max)
         self._height = 1.0 / config.field.downwash
 
-    def destination(self, now: int, epoch: int, rest: Array, aim: Aim, agreements: Agreements) -> Array:
+    def destination(self, now: int, epoch: int, rest: Array, aim: Aim, peers: Peers) -> Array:
         """Return where the plan of the epoch after ``epoch`` (µs) should end at ``now`` (µs), (3,), m.
 
         ``rest`` (3,), m: where the committed plan ends. ``aim``: with the destination without the others.
         """
         if aim.surface is None:
-            return self._beside_goal(now, epoch, rest, aim.destination, agreements)
-        return self._on_surface(rest, aim, aim.surface, agreements) if self._assigns else aim.destination
+            return self._beside_goal(now, epoch, rest, aim.destination, peers)
+        return self._on_surface(rest, aim, aim.surface, peers) if self._assigns else aim.destination
 
-    def _on_surface(self, rest: Array, aim: Aim, surface: Surface, agreements: Agreements) -> Array:
+    def _on_surface(self, rest: Array, aim: Aim, surface: Surface, peers: Peers) -> Array:
         target, destination = aim.target_end, aim.destination
-        ends, left = agreements.ends(), agreements.left
+        ends, left = peers.ends(), peers.left
         if not ends and not left:
             return destination
         reach = self._obstacles.between + BESIDE_M
@@ -86,12 +86,12 @@ class Places:
             places = np.column_stack([places[:, :2], np.broadcast_to(ends[..., 2], len(places))])
         return np.asarray(inside & self._obstacles.fixed.clear(places))
 
-    def _beside_goal(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
+    def _beside_goal(self, now: int, epoch: int, rest: Array, goal: Array, peers: Peers) -> Array:
         """Return ``goal`` (3,), m, or the nearest free place if a vehicle that said farewell covers it.
 
         The goals of those that ask for room are not free, unless there is no other place.
         """
-        left = agreements.left
+        left = peers.left
         if not left:
             return goal
         ends = np.array([last.controls[-1, 2, :2] for last in left.values()])
@@ -99,7 +99,7 @@ class Places:
         if not covered(goal[:2], ends, radii):
             return goal
         asking = [one.position_m for one in self._told.recent(now).values() if one.room]
-        for discs in self._obstacles.resting(epoch, rest, goal, agreements, asking):
+        for discs in self._obstacles.resting(epoch, rest, goal, peers, asking):
             place = free_place(goal[:2], discs, self._low[:2], self._high[:2])
             if place is not None:
                 return np.array([place[0], place[1], goal[2]])

@@ -116,14 +116,14 @@ class PlanGoals:
         room = self._room if given and not moving else None
         aim, asked = destination, None
         if room is not None:
-            aim = room.destination(now, epoch, rest, destination, self._agreements)
+            aim = room.destination(now, epoch, rest, destination, self._agreements.peers)
             if room.moved:
                 self._deadlock_turn.restart()
         subgoal = self._subgoal(now, epoch, rest, aim)
         goal = subgoal.place
         if room is not None:
             occupied = self._deadlock_turn.stalled and self._obstacles.occupied(
-                epoch, destination, self._agreements
+                epoch, destination, self._agreements.peers
             )
             asked = room.asked(rest, goal, closed=self._closed, occupied=occupied)
         if not self._gives_way:
@@ -152,9 +152,9 @@ class PlanGoals:
         way, stalled = self._way, self._deadlock_turn.stalled
         begun, led = self._begun(), self._led
         if way is not None and stalled:
-            way.go_round(now, lambda: self._obstacles.at_rest(epoch, self._agreements))
+            way.go_round(now, lambda: self._obstacles.at_rest(epoch, self._agreements.peers))
         goal = Subgoal(destination, 0.0) if way is None else way.towards(rest, destination)
-        in_lane = self._lane_goals.subgoal(now, rest, destination, goal.place, self._agreements.ends)
+        in_lane = self._lane_goals.subgoal(now, rest, destination, goal.place, self._agreements.peers.ends)
         if self._in_lane != (in_lane is not None):
             self._in_lane = in_lane is not None
             self._deadlock_turn.restart()
@@ -179,7 +179,7 @@ class PlanGoals:
                 now,
                 rest,
                 goal,
-                lambda: self._obstacles.at_rest(epoch, self._agreements),
+                lambda: self._obstacles.at_rest(epoch, self._agreements.peers),
                 stands=self._deadlock_turn.stands,
                 stalled=stalled,
             )
@@ -190,7 +190,7 @@ class PlanGoals:
             now,
             rest,
             goal,
-            lambda: self._obstacles.resting(epoch, rest, goal, self._agreements),
+            lambda: self._obstacles.resting(epoch, rest, goal, self._agreements.peers),
             stalled=stalled,
         )
 
@@ -231,7 +231,7 @@ class PlanGoals:
 
         The others are where their newest plans are when this one begins.
         """
-        begins, plans, told = start.epoch, self._agreements.newest(), self._told.recent(now)
+        begins, plans, told = start.epoch, self._agreements.peers.newest(), self._told.recent(now)
         met = [system for system in sorted(told) if system in plans]
         places = [plans[s].later(max(begins, plans[s].plan.epoch), 1)[0, 0] for s in met]
         ways = [(place, told[system].position_m) for system, place in zip(met, places, strict=True)]

@@ -88,7 +88,7 @@ class Reservation:
         """
         near = self._agreements.near()
         if near and self._commitment.column:
-            near -= {system for system in self._agreements.columns if system > self._agreements.own}
+            near -= {system for system in self._agreements.peers.columns if system > self._agreements.own}
         return not near
 
     def watch(self, now: int, *, listens: bool = False) -> None:

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.free_place import covered, free_places
+from companion.avoidance.certified.peers import Peers
 from companion.avoidance.certified.told_goals import REACHED_M, ToldGoals
 from companion.avoidance.certified.visibility_graph import Discs, free, without
 from companion.avoidance.certified.way_obstacles import WayObstacles
@@ -62,7 +62,7 @@ class Room:
         self.moved = False
         """Whether ``destination`` is another place than when it was called before, for the same goal."""
 
-    def destination(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array:
+    def destination(self, now: int, epoch: int, rest: Array, goal: Array, peers: Peers) -> Array:
         """Return where to go at ``now`` (µs): the ``goal`` (3,), m, or a place beside corridors.
 
         These are the corridors of those that ask. The plan of ``epoch`` (µs) ends at ``rest`` (3,), m.
@@ -75,7 +75,7 @@ class Room:
         self._there = float(np.abs(rest - goal).max()) < REACHED_M
         self._reached |= self._there
         self._asks &= not self._there
-        self._aside = self._place(now, epoch, rest, goal, agreements) if self._reached else None
+        self._aside = self._place(now, epoch, rest, goal, peers) if self._reached else None
         self.moved = before is not self._aside
         return goal if self._aside is None else self._aside
 
@@ -99,16 +99,16 @@ class Room:
         rank = _MOST_RANK if self._aside is None and self._occupied else self._rank
         return room_to(rest + limit(subgoal - rest, longest), rank)
 
-    def _place(self, now: int, epoch: int, rest: Array, goal: Array, agreements: Agreements) -> Array | None:
+    def _place(self, now: int, epoch: int, rest: Array, goal: Array, peers: Peers) -> Array | None:
         """Return the place to stand at while ``goal`` (3,), m, is in a corridor; None if it is in none."""
         asking = self._asking(now, goal)
-        ends = agreements.ends() if asking else {}
+        ends = peers.ends() if asking else {}
         wide = [self._corridor(one, ends.get(one.system), goal, _WIDE) for one in asking]
         counted = [index for index, discs in enumerate(wide) if covered(goal[:2], discs.centres, discs.radii)]
         if not counted:
             self._rank = 0
             return None
-        resting, fixed = self._obstacles.resting(epoch, rest, goal, agreements)
+        resting, fixed = self._obstacles.resting(epoch, rest, goal, peers)
         if self._aside is not None:
             kept = [self._corridor(one, ends.get(one.system), goal, _KEPT) for one in asking]
             if not any(covered(self._aside[:2], discs.centres, discs.radii) for discs in kept):

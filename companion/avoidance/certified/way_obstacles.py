@@ -11,9 +11,9 @@ from math import hypot, sqrt
 
 import numpy as np
 
-from companion.avoidance.certified.agreements import Agreements
 from companion.avoidance.certified.departed import DepartedVehicles
 from companion.avoidance.certified.fixed_surfaces import FixedSurfaces
+from companion.avoidance.certified.peers import Peers
 from companion.avoidance.certified.visibility_graph import Discs, Rectangles, rectangles
 from companion.config import CompanionConfig
 from companion.config.obstacles import Post
@@ -44,7 +44,7 @@ class WayObstacles:
         """See ``DepartedVehicles.from_last``."""
 
     def resting(
-        self, epoch: int, here: Array, there: Array, agreements: Agreements, goals: Sequence[Array] = ()
+        self, epoch: int, here: Array, there: Array, peers: Peers, goals: Sequence[Array] = ()
     ) -> list[Discs]:
         """Return the discs that a way must avoid from ``epoch`` (µs) on; then those that stay for ever alone.
 
@@ -58,11 +58,11 @@ class WayObstacles:
             above = 0.0 if isinstance(one, Post) else max(one.at[2] - high, low - one.at[2], 0.0)
             fixed.append((one.at[:2], self.fixed.least + one.radius, above))
         landed = [
-            (tuple(last.controls[-1, 2, :2]), self.from_last(last), 0.0) for last in agreements.left.values()
+            (tuple(last.controls[-1, 2, :2]), self.from_last(last), 0.0) for last in peers.left.values()
         ]
         ends = [
-            (end, self._config.planar or system in agreements.columns)
-            for system, end in _ends_at_rest(epoch, agreements).items()
+            (end, self._config.planar or system in peers.columns)
+            for system, end in _ends_at_rest(epoch, peers).items()
         ]
         ends += [(goal, self._config.planar) for goal in goals]
         vehicles = []
@@ -75,32 +75,32 @@ class WayObstacles:
             for found in (fixed + landed + vehicles, fixed + landed)
         ]
 
-    def at_rest(self, epoch: int, agreements: Agreements) -> Balls:
+    def at_rest(self, epoch: int, peers: Peers) -> Balls:
         """Return where others rest that a way must pass from ``epoch`` (µs) on, beside fixed obstacles.
 
         These are landed vehicles, and those whose newest plan rests. Of landed vehicles, of columns and in a
         plane heights do not count. Plans keep as much from these as from fixed obstacles.
         """
         places, kept, flat = [], [], []
-        for last in agreements.left.values():
+        for last in peers.left.values():
             places.append(last.controls[-1, 2])
             kept.append(self.from_last(last))
             flat.append(0.0)
-        for system, end in _ends_at_rest(epoch, agreements).items():
-            level = self._config.planar or system in agreements.columns
+        for system, end in _ends_at_rest(epoch, peers).items():
+            level = self._config.planar or system in peers.columns
             places.append(end)
             kept.append(self.between)
             flat.append(0.0 if level else 1.0 / self._config.field.downwash)
         radii = np.array(kept) - self.fixed.least
         return Balls(np.array(places).reshape(-1, 3), radii, np.array(flat))
 
-    def occupied(self, epoch: int, goal: Array, agreements: Agreements) -> bool:
+    def occupied(self, epoch: int, goal: Array, peers: Peers) -> bool:
         """Return whether a vehicle rests on ``goal`` (3,), m, from ``epoch`` (µs) on, near a landed one.
 
         It is nearer to ``goal`` than plans keep. The landed vehicle may cover the goal of that one.
         """
-        left = agreements.left
-        ends = _ends_at_rest(epoch, agreements).values() if left else ()
+        left = peers.left
+        ends = _ends_at_rest(epoch, peers).values() if left else ()
         return any(self.apart(end - goal) < self.between and self._departed.near(end, left) for end in ends)
 
     def apart(self, difference: Array) -> float:
@@ -131,13 +131,13 @@ class WayObstacles:
         return Rectangles(*(part[nearest] for part in found))
 
 
-def _ends_at_rest(epoch: int, agreements: Agreements) -> dict[int, Array]:
+def _ends_at_rest(epoch: int, peers: Peers) -> dict[int, Array]:
     """Return where the newest plans of vehicles that rest at ``epoch`` (µs) end (3,), m, by system id.
 
     Landed vehicles are left out.
     """
-    resting = agreements.resting(epoch - _RESTED_US, _AT_REST_M)
-    return {system: end for system, end in resting.items() if system not in agreements.left}
+    resting = peers.resting(epoch - _RESTED_US, _AT_REST_M)
+    return {system: end for system, end in resting.items() if system not in peers.left}
 
 
 def _discs(found: list[tuple[tuple[float, ...], float, float]]) -> Discs:

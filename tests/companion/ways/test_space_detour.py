@@ -253,12 +253,12 @@ def test_two_that_meet_head_on_in_a_tube_pass_each_other() -> None:
 def test_heights_of_landed_vehicles_and_columns_do_not_count_as_those_of_others_do() -> None:
     ends = {2: np.array([1.0, 0.0, 2.0]), 3: np.array([0.0, 1.0, 2.0])}
     landed = SimpleNamespace(controls=np.full((STEPS, 3, 3), 0.5), plan=SimpleNamespace(column=True))
-    agreements: Any = SimpleNamespace(left={4: landed}, columns=(3,), resting=lambda *_: ends)
+    peers: Any = SimpleNamespace(left={4: landed}, columns=(3,), resting=lambda *_: ends)
     for planar, flat in ((False, [0.0, 0.5, 0.0]), (True, [0.0, 0.0, 0.0])):
         config = CompanionConfig.model_validate(
             {"avoidance": "certified", "planar": planar, "field": {"downwash": 2.0}}
         )
         obstacles = WayObstacles(config, FixedSurfaces(config))
-        found = obstacles.at_rest(0, agreements)
+        found = obstacles.at_rest(0, peers)
         assert (found.centres == [[0.5, 0.5, 0.5], ends[2], ends[3]]).all()
         assert found.flat.tolist() == flat

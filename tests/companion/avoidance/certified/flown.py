@@ -56,7 +56,7 @@ class Flown:
         if newest is None or not one.plans:
             return
         if not one.habits.leaves <= since < one.habits.returns:
-            left = one.flight.agreements.left.items()
+            left = one.flight.agreements.peers.left.items()
             self.misled += [(since, one.system, s) for s, last in left if self._flies_another(s, last.plan)]
         for system, agreement, plans in one.keeps():
             kept = Kept(one.system, system, agreement, newest.epoch)

@@ -52,7 +52,7 @@ def test_any_other_bytes_are_refused(data: bytes) -> None:
     one = agreements()
     one.receive_plan(NOW, OTHER, data)
     assert one.refused == 1
-    assert not one.members
+    assert not one.peers.members
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_what_cannot_be_a_committed_plan_is_refused(bad: WirePlan, reported: Ref
     assert one.refused == 1
     assert one.refused_senders(NOW) == reported
     assert one.refused_senders(NOW + 5_000_000) == RefusedSenders()
-    assert not one.members
+    assert not one.peers.members
 
 
 def test_nothing_is_agreed_with_two_vehicles_of_one_id() -> None:
@@ -108,24 +108,24 @@ def test_a_statement_of_another_fleet_is_refused_though_eight_bits_of_it_agree()
     one.receive_statement(NOW, OTHER, other)
     assert one.refused == 1
     assert one.refused_senders(NOW).differing == (OTHER,)
-    assert not one.members
+    assert not one.peers.members
 
 
 def test_of_a_vehicle_of_another_fleet_no_plan_is_accepted_whichever_message_comes_first() -> None:
     one = agreements()
     other = Statement(FRAME ^ 0x100, EPOCH, EPOCH, (Entry(OWN),))
     one.receive_plan(NOW, OTHER, pack(plan()))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
     one.receive_statement(NOW, OTHER, other)
-    assert not one.members
+    assert not one.peers.members
     one.receive_plan(NOW, OTHER, pack(plan()))
-    assert not one.members
+    assert not one.peers.members
     assert one.refused == 2
     # Its sender begins again, with the settings of this fleet.
     later = NOW + 5_000_000
     one.receive_plan(later, OTHER, pack(plan(25)))
     one.receive_statement(later, OTHER, statement(25, Entry(OWN), since=25))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
     assert one.refused_senders(later) == RefusedSenders()
 
 
@@ -159,9 +159,9 @@ def test_a_statement_by_a_clock_that_is_far_ahead_is_refused_and_stands_in_no_on
     one = agreements()
     one.receive_statement(NOW, OTHER, statement(25, Entry(OWN), since=25))
     assert one.refused == 1
-    assert not one.members
+    assert not one.peers.members
     one.receive_statement(NOW, OTHER, statement(0, Entry(OWN)))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
 
 
 @pytest.mark.parametrize(("number", "since"), [(25, 0), (0, 25)])

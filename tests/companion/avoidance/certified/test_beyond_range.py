@@ -114,7 +114,7 @@ def test_who_was_last_heard_beyond_the_range_is_no_obstacle_however_long_ago(x: 
     one.hears_plan(x)
     one.hears(statement(0))
     one.hears_position(x)
-    assert one.agreements.distant == {OTHER: NOW}
+    assert one.agreements.peers.distant == {OTHER: NOW}
     assert one.constraints(later) == FREE
 
 
@@ -125,7 +125,7 @@ def test_who_was_counted_and_left_is_no_obstacle() -> None:
     one.hears_plan(20.0, 1)
     assert one.constraints(LATER) == FREE
     one.hears_plan(19.0, 2)
-    assert not one.agreements.distant
+    assert not one.agreements.peers.distant
 
 
 def test_who_says_only_where_he_is_may_do_anything_until_a_plan_of_his_comes() -> None:
@@ -160,10 +160,10 @@ def test_who_said_farewell_is_known_to_lie_there_when_this_vehicle_comes_back() 
     one = Here()
     one.hears_plan(4.0)
     one.hears(leaving())
-    assert one.agreements.left.keys() == {OTHER}
+    assert one.agreements.peers.left.keys() == {OTHER}
     one.x = -FAR
     one.hears_plan(4.0)
-    assert one.agreements.left.keys() == {OTHER}
+    assert one.agreements.peers.left.keys() == {OTHER}
     one.hears_position(4.0)
     # Its last plan, and where it stays.
     away = one.constraints(LATER)
@@ -196,7 +196,7 @@ def test_who_is_of_another_fleet_beyond_the_range_is_forgotten() -> None:
     one.hears_plan(FAR)
     one.hears_position(FAR)
     one.hears(differing())
-    assert not one.agreements.distant
+    assert not one.agreements.peers.distant
     assert one.constraints(LATER).vehicles == 1
     # Nothing more of it is accepted for a while, not even a repeated message.
     one.hears_plan(FAR)
@@ -212,7 +212,7 @@ def test_the_farewell_of_who_is_beyond_the_range_is_forgotten_at_an_own_farewell
     one.x = -FAR
     one.hears_plan(4.0)
     one.agreements.leave(epoch(1))
-    assert not one.agreements.left
+    assert not one.agreements.peers.left
     if rejoins:
         assert one.agreements.rejoin()
     else:

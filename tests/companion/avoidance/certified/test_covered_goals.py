@@ -39,12 +39,12 @@ class Beside:
         self.d = obstacles.between
         self._places = Places(config, 1, self.told, obstacles)
         landed = {9: stored(at_rest(EPOCH, DT, STEPS, ORIGIN, 7))}
-        self._agreements: Any = SimpleNamespace(left=landed, columns=(), resting=lambda *_: {})
+        self._peers: Any = SimpleNamespace(left=landed, columns=(), resting=lambda *_: {})
 
     def place(self, now: int) -> Array:
         """Where it goes at ``now`` µs, (3,), m."""
         aim = standing(ORIGIN + 0.5 * EAST)
-        return self._places.destination(now, EPOCH, ORIGIN + 2.0 * EAST, aim, self._agreements)
+        return self._places.destination(now, EPOCH, ORIGIN + 2.0 * EAST, aim, self._peers)
 
 
 @pytest.mark.parametrize("planar", [True, False])
@@ -86,14 +86,14 @@ def told(
     config = CompanionConfig.model_validate(document)
     obstacles, goals_told = WayObstacles(config, FixedSurfaces(config)), ToldGoals(Source(1, 1), 7)
     rest = ORIGIN - 0.6 * obstacles.between * EAST
-    agreements: Any = SimpleNamespace(
+    peers = SimpleNamespace(
         left={9: stored(at_rest(EPOCH, DT, STEPS, landed, 7))},
         columns=(),
         resting=lambda *_: others | {9: landed},
         ends=lambda: others,
         newest=dict,
-        age=lambda *_: 0.0,
     )
+    agreements: Any = SimpleNamespace(peers=peers, age=lambda *_: 0.0)
     turn = DeadlockTurn(DeadlockConfig(), 1.0)
     goals = PlanGoals(config, Source(1, 1), agreements, obstacles, goals_told, turn, 1.0)
     goals.prepare(5.0)
@@ -149,9 +149,9 @@ class Asking:
 
     def rank(self, before: float, *, closed: bool = False) -> int | None:
         """The rank with which it asks, ``before`` (m) its goal, on which one rests; None: none."""
-        agreements: Any = SimpleNamespace(left={}, columns=(), resting=lambda *_: {}, ends=dict)
+        peers: Any = SimpleNamespace(left={}, columns=(), resting=lambda *_: {}, ends=dict)
         rest = ORIGIN - before * EAST
-        self._room.destination(0, 0, rest, ORIGIN, agreements)
+        self._room.destination(0, 0, rest, ORIGIN, peers)
         asked = self._room.asked(rest, ORIGIN, closed=closed, occupied=True)
         return None if asked is None else asked.rank
 

@@ -29,15 +29,15 @@ def test_who_left_with_its_newest_plan_is_no_member() -> None:
     one = agreements(OWN, OWN, OTHER)
     one.receive_plan(NOW, OTHER, pack(plan(speed=2.0)))
     one.receive_statement(NOW, OTHER, leaving())
-    assert not one.members | one.missing()
-    assert one.left[OTHER].plan == plan(speed=2.0)
+    assert not one.peers.members | one.missing()
+    assert one.peers.left[OTHER].plan == plan(speed=2.0)
     assert one.entries(every=True) == (Entry(OTHER, departed=True),)
 
 
 def test_its_agreements_are_void() -> None:
     two = agreed()
     two.first.receive_statement(NOW, OTHER, leaving())
-    assert two.first.left.keys() == {OTHER}
+    assert two.first.peers.left.keys() == {OTHER}
     assert not two.first.agreed()
     assert not two.first.kept()
     assert not two.first.outdated(NOW, EPOCH)
@@ -47,12 +47,12 @@ def test_a_farewell_without_its_plan_is_not_accepted() -> None:
     one = agreements(OWN, OWN, OTHER)
     one.receive_plan(NOW, OTHER, pack(plan()))
     one.receive_statement(NOW + LENGTH, OTHER, leaving(1))
-    assert not one.left
+    assert not one.peers.left
     assert one.missing() == {OTHER}
     one.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, x=0.5)))
-    assert not one.left
+    assert not one.peers.left
     one.receive_statement(NOW + LENGTH, OTHER, leaving(1))
-    assert one.left[OTHER].plan == plan(1, x=0.5)
+    assert one.peers.left[OTHER].plan == plan(1, x=0.5)
 
 
 def test_a_farewell_that_comes_after_a_later_plan_is_not_accepted() -> None:
@@ -62,8 +62,8 @@ def test_a_farewell_that_comes_after_a_later_plan_is_not_accepted() -> None:
         one.receive_plan(NOW, OTHER, pack(plan(number)))
     for late in (0, 60_000_000):
         one.receive_statement(NOW + late, OTHER, leaving())
-        assert not one.left
-        assert one.members == {OTHER}
+        assert not one.peers.left
+        assert one.peers.members == {OTHER}
 
 
 def test_what_was_stated_before_a_farewell_and_comes_late_changes_nothing() -> None:
@@ -75,8 +75,8 @@ def test_what_was_stated_before_a_farewell_and_comes_late_changes_nothing() -> N
         one.receive_statement(
             NOW + LENGTH, OTHER, statement(number, Entry(OWN, ((EPOCH, EPOCH),), (EPOCH, EPOCH)))
         )
-    assert one.left[OTHER].plan == plan(1)
-    assert not one.members
+    assert one.peers.left[OTHER].plan == plan(1)
+    assert not one.peers.members
 
 
 def test_a_farewell_counts_only_once_its_plan_has_begun() -> None:
@@ -84,9 +84,9 @@ def test_a_farewell_counts_only_once_its_plan_has_begun() -> None:
     one = agreements(OWN, OWN, OTHER)
     one.receive_plan(NOW, OTHER, pack(plan(2)))
     one.receive_statement(NOW, OTHER, leaving(2))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
     one.receive_statement(epoch(2), OTHER, leaving(2))
-    assert one.left[OTHER].plan == plan(2)
+    assert one.peers.left[OTHER].plan == plan(2)
 
 
 def test_a_later_plan_ends_a_departure_unless_it_is_the_last_plan_carried_on() -> None:
@@ -96,10 +96,10 @@ def test_a_later_plan_ends_a_departure_unless_it_is_the_last_plan_carried_on() -
     one.receive_plan(NOW, OTHER, pack(last))
     one.receive_statement(NOW, OTHER, leaving(0))
     one.receive_plan(epoch(1), OTHER, pack(carried_on(last, LENGTH // DT)))
-    assert not one.members
+    assert not one.peers.members
     one.receive_plan(epoch(2), OTHER, pack(plan(2, x=3.0)))
-    assert one.members == one.missing() == {OTHER}
-    assert not one.left
+    assert one.peers.members == one.missing() == {OTHER}
+    assert not one.peers.left
 
 
 def test_who_comes_back_is_a_member_again_and_needs_an_agreement() -> None:
@@ -112,8 +112,8 @@ def test_who_comes_back_is_a_member_again_and_needs_an_agreement() -> None:
     two.make(OTHER, plan(3, x=4.0))
     statement_without_agreements = Statement(FRAME, epoch(3), two.second.since, (Entry(OWN),))
     two.first.receive_statement(back, OTHER, statement_without_agreements)
-    assert two.first.members == two.first.missing() == {OTHER}
-    assert not two.first.left
+    assert two.first.peers.members == two.first.missing() == {OTHER}
+    assert not two.first.peers.left
     two.agree(back)
     assert not two.first.missing() | two.second.missing()
     assert all(one.other > EPOCH for one in two.first.kept()[OTHER])
@@ -157,7 +157,7 @@ def test_a_farewell_counts_only_if_its_sender_has_considered_a_plan_since_the_ow
     considered = epoch(4), epoch(3) if answers else epoch(2)
     farewell = statement(4, Entry(THIRD, considered=(epoch(4), epoch(9))), Entry(OWN, (), considered))
     one.receive_statement(epoch(4), OTHER, farewell._replace(farewell=True))
-    assert (OTHER in one.left) == answers
+    assert (OTHER in one.peers.left) == answers
 
 
 def test_who_ends_before_there_is_an_agreement_is_not_waited_for() -> None:
@@ -171,7 +171,7 @@ def test_who_ends_before_there_is_an_agreement_is_not_waited_for() -> None:
     now = NOW + LENGTH
     two.first.receive_plan(now, OTHER, pack(plan(1, x=4.0)))
     two.first.receive_statement(now, OTHER, Statement(FRAME, epoch(1), EPOCH, entries, farewell=True))
-    assert two.first.left.keys() == {OTHER}
+    assert two.first.peers.left.keys() == {OTHER}
     # What was received bars no agreement.
     alive = Two()
     alive.make(OWN, plan())
@@ -196,10 +196,10 @@ def test_between_the_own_farewell_and_the_return_no_farewell_counts() -> None:
     one = agreements(OWN, OWN, OTHER)
     one.receive_plan(NOW, OTHER, pack(plan()))
     one.receive_statement(NOW, OTHER, leaving())
-    assert one.left.keys() == {OTHER}
+    assert one.peers.left.keys() == {OTHER}
     one.leave(epoch(1))
     for _ in range(2):
-        assert not one.left
+        assert not one.peers.left
         assert one.missing() == {OTHER}
         assert one.entries(every=True)[0].departed
         one.receive_statement(NOW + LENGTH, OTHER, leaving())
@@ -220,7 +220,7 @@ def test_a_farewell_of_a_later_departure_ends_the_earlier_one() -> None:
     one.receive_plan(NOW, OTHER, pack(plan()))
     one.receive_statement(NOW, OTHER, leaving())
     one.receive_statement(epoch(3), OTHER, leaving(2))
-    assert one.left.keys() == {OTHER}
+    assert one.peers.left.keys() == {OTHER}
     one.receive_statement(epoch(3), OTHER, leaving(3)._replace(since=epoch(2)))
     assert one.missing() == {OTHER}
 

@@ -61,7 +61,7 @@ def leave(flight: CertifiedFlight, end: Array) -> None:
     entry = Entry(OWN, considered=(EPOCH, agreements.since))
     farewell = Statement(fingerprint(CONFIG, FLEET), EPOCH, EPOCH, (entry,), farewell=True)
     agreements.receive_statement(EPOCH, LEFT, farewell)
-    assert agreements.left.keys() == {LEFT}
+    assert agreements.peers.left.keys() == {LEFT}
 
 
 def way(received: Callable[[int], Array | None], *, whom: int = LEFT, end: Array = END) -> Array:

@@ -150,7 +150,7 @@ def test_nobody_agrees_with_a_vehicle_of_another_fingerprint(loss: float, seed: 
     assert not swarm.faults()
     assert one.refused_senders(ENDS).differing == two.refused_senders(ENDS).differing == (3,)
     assert other.refused_senders(ENDS).differing == (1, 2)
-    assert (one.members, two.members) == ({2}, {1})
+    assert (one.peers.members, two.peers.members) == ({2}, {1})
     arrived = [swarm.vehicles[k].plan(max(swarm.epochs())).position_m for k in (0, 1)]
     assert np.abs(np.array(arrived) - [goals(0, 1), goals(0, 2)]).max() < 0.5
 

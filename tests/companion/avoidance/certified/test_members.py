@@ -42,7 +42,7 @@ def test_who_is_heard_or_named_is_a_member_and_never_forgotten(by: str) -> None:
     else:
         one.receive_statement(NOW, OTHER, statement(0, Entry(THIRD)))
     for number in range(20):
-        assert THIRD in one.members
+        assert THIRD in one.peers.members
         assert THIRD in one.missing()
         assert (THIRD in {entry.peer for entry in one.entries(every=True)}) == (by != "plan")
         one.receive_statement(NOW + number * LENGTH, OTHER, statement(number, Entry(OWN)))
@@ -51,19 +51,19 @@ def test_who_is_heard_or_named_is_a_member_and_never_forgotten(by: str) -> None:
 def test_who_left_by_the_word_of_another_is_no_member_unless_it_was_heard() -> None:
     one = agreements()
     one.receive_statement(NOW, OTHER, statement(0, Entry(THIRD, departed=True)))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
     one.receive_statement(NOW, OTHER, statement(1, Entry(THIRD)))
-    assert one.members == {OTHER, THIRD}
+    assert one.peers.members == {OTHER, THIRD}
     # What was stated before and comes late changes nothing.
     one.receive_statement(NOW, OTHER, statement(0, Entry(THIRD, departed=True)))
-    assert one.members == {OTHER, THIRD}
+    assert one.peers.members == {OTHER, THIRD}
     one.receive_plan(NOW, THIRD, pack(plan()))
     one.receive_statement(NOW, OTHER, statement(2, Entry(THIRD, departed=True)))
-    assert one.members == {OTHER, THIRD}
+    assert one.peers.members == {OTHER, THIRD}
 
 
 def test_nobody_is_a_peer_of_itself() -> None:
     one = agreements(OWN, OWN, OTHER)
     one.receive_statement(NOW, OWN, statement(0, Entry(THIRD)))
     one.receive_statement(NOW, OTHER, statement(0, Entry(OWN)))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}

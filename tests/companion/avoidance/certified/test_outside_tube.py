@@ -93,11 +93,11 @@ def test_who_leaves_its_tube_states_by_how_much_until_it_is_back() -> None:
     assert pair.stated == {1: 0.0, 2: 0.0}
     pair.run(1_000_000, 2_000_000, outside)
     assert pair.stated == {1: pytest.approx(0.35), 2: 0.0}
-    assert pair.flights[2].agreements.outside == pytest.approx(0.35)
+    assert pair.flights[2].agreements.peers.outside == pytest.approx(0.35)
     assert pair.flights[1].tube.left == 1
     pair.run(2_000_000, 3_000_000, inside)
     assert pair.stated == {1: 0.0, 2: 0.0}
-    assert pair.flights[2].agreements.outside == 0.0
+    assert pair.flights[2].agreements.peers.outside == 0.0
 
 
 def test_a_statement_that_comes_again_counts_again() -> None:

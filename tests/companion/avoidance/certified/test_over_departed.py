@@ -54,7 +54,8 @@ def away(height: float, aside: float, *, planar: bool = False, column: bool = Fa
     last = resting(EPOCH, DT, STEPS, BELOW, 7, column=column)
     rest = BELOW + sources.between * np.array([0.0, -aside, height])
     own, goal = np.tile(rest, (STEPS, 3, 1)), rest + np.array([20.0, 0.0, 0.0])
-    left: Any = SimpleNamespace(left={9: stored(last)}, members=set(), away=set(), distant={}, agreed=list)
+    peers = SimpleNamespace(left={9: stored(last)}, members=set(), away=set(), distant={})
+    left: Any = SimpleNamespace(peers=peers, agreed=list)
     world = World(config, 1, 190, FLEET)
     others, _ = sources.around(EPOCH, EPOCH, own, goal, left, world, View(None, None, None, None))
     assert len(others.own) == 2

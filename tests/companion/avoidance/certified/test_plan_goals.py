@@ -36,7 +36,8 @@ def test_a_way_through_gaps_that_open_and_close_is_no_progress() -> None:
         shut = -2.5 if (plans // BY_TURNS) % 2 else 2.5
         return {k: np.array([0.0, d * y, 1.2]) for k, y in enumerate([*WALL, shut], 20)}
 
-    agreements: Any = SimpleNamespace(left={}, columns=(), resting=resting, ends=lambda: resting(0, 0.0))
+    peers = SimpleNamespace(left={}, columns=(), resting=resting, ends=lambda: resting(0, 0.0))
+    agreements: Any = SimpleNamespace(peers=peers)
     turn = DeadlockTurn(DeadlockConfig(), 1.0)
     goals = PlanGoals(config, Source(1, 1), agreements, obstacles, ToldGoals(Source(1, 1), 7), turn, 1.0)
     goals.prepare(1.2)
@@ -62,8 +63,10 @@ def least_angle(blocking: dict[int, Any], *, planar: bool) -> float:
     """
     config = CompanionConfig.model_validate({"avoidance": "certified", "planar": planar})
     obstacles = WayObstacles(config, FixedSurfaces(config))
-    others: dict[str, Any] = {"left": {}, "columns": (), "newest": dict, "age": lambda *_: 0.0}
-    agreements: Any = SimpleNamespace(**others, resting=lambda *_: blocking, ends=lambda: blocking)
+    peers = SimpleNamespace(
+        left={}, columns=(), newest=dict, resting=lambda *_: blocking, ends=lambda: blocking
+    )
+    agreements: Any = SimpleNamespace(peers=peers, age=lambda *_: 0.0)
     turn = DeadlockTurn(DeadlockConfig(), 1.0)
     goals = PlanGoals(config, Source(1, 1), agreements, obstacles, ToldGoals(Source(1, 1), 7), turn, 1.0)
     goals.prepare(5.0)

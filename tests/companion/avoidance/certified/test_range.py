@@ -195,11 +195,11 @@ def met(one: Agreements, x: float = 4.0) -> None:
 
 def test_nobody_is_waited_for_before_he_is_heard() -> None:
     one = limited()
-    assert not one.members
+    assert not one.peers.members
     one.receive_plan(NOW, OTHER, pack(plan(x=4.0)))
     assert one.missing() == {OTHER}
     one.receive_statement(NOW, OTHER, statement(0, Entry(THIRD)))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
 
 
 def test_who_is_heard_beyond_the_range_costs_nothing_and_is_met_anew() -> None:
@@ -208,7 +208,7 @@ def test_who_is_heard_beyond_the_range_costs_nothing_and_is_met_anew() -> None:
     assert one.kept() == {OTHER: (Agreement(EPOCH, EPOCH),)}
     assert not one.missing()
     one.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, x=11.0)))
-    assert not one.members | one.kept().keys() | {entry.peer for entry in one.entries(every=True)}
+    assert not one.peers.members | one.kept().keys() | {entry.peer for entry in one.entries(every=True)}
     one.receive_plan(NOW + 2 * LENGTH, OTHER, pack(plan(2, x=9.0)))
     assert one.missing() == {OTHER}
     (entry,) = one.entries(every=True)
@@ -220,18 +220,18 @@ def test_who_has_begun_anew_within_the_range_is_counted_whatever_its_old_plans_s
     """Another controller has flown it here; its first plan begins with the next epoch."""
     one = limited()
     one.receive_plan(NOW, OTHER, pack(plan(x=11.0)))
-    assert not one.members
+    assert not one.peers.members
     one.receive_plan(NOW + 5 * LENGTH, OTHER, pack(plan(6, x=4.0)))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
 
 
 def test_the_plan_of_the_present_epoch_counts_until_the_next_one_begins() -> None:
     one = limited()
     one.receive_plan(NOW, OTHER, pack(plan(x=11.0)))
     one.receive_plan(NOW, OTHER, pack(plan(1, x=9.0)))
-    assert not one.members
+    assert not one.peers.members
     one.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, x=9.0)))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
 
 
 @pytest.mark.parametrize("first", [LENGTH, 2 * LENGTH])
@@ -241,16 +241,16 @@ def test_no_plan_of_before_it_began_anew_shows_that_a_vehicle_is_beyond(first: i
     one.receive_plan(NOW, OTHER, pack(plan(x=11.0)))
     one.receive_plan(NOW, OTHER, pack(plan(1, x=11.0)))
     one.receive_statement(NOW, OTHER, statement(1))
-    assert not one.members
+    assert not one.peers.members
     one.receive_statement(NOW + LENGTH, OTHER, statement(2, since=2))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
     # Nor do a repeated plan, a late plan and a late statement.
     one.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, x=11.0)))
     one.receive_plan(NOW + LENGTH, OTHER, pack(plan(-1, x=11.0)))
     one.receive_statement(NOW + LENGTH, OTHER, statement(1))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
     one.receive_plan(NOW + first, OTHER, pack(plan(2, x=11.0)))
-    assert not one.members
+    assert not one.peers.members
 
 
 def test_one_under_another_controller_is_not_counted_for_its_beginnings() -> None:
@@ -260,9 +260,9 @@ def test_one_under_another_controller_is_not_counted_for_its_beginnings() -> Non
     one.receive_statement(NOW, OTHER, statement(0))
     flown = statement(0, since=1)._replace(away=True)
     one.receive_statement(NOW + LENGTH, OTHER, flown)
-    assert not one.members
+    assert not one.peers.members
     one.receive_statement(NOW + LENGTH, OTHER, statement(1, since=1))
-    assert one.members == {OTHER}
+    assert one.peers.members == {OTHER}
 
 
 def test_who_is_silent_stays_counted() -> None:
@@ -314,7 +314,7 @@ def test_a_fleet_with_a_range_stays_apart_and_arrives(loss: float) -> None:
     ends = [vehicle.flight.commitment.own()[-1, 2] for vehicle in swarm.vehicles]
     np.testing.assert_allclose(ends, goals, atol=0.05)
     parted = [vehicle.flight.agreements for vehicle in swarm.vehicles]
-    assert any(len(one.members) < 2 for one in parted)
+    assert any(len(one.peers.members) < 2 for one in parted)
 
 
 def test_four_that_meet_in_two_lines_turn_back_and_arrive() -> None:

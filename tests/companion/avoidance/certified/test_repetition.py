@@ -121,22 +121,22 @@ def test_the_share_counts_the_epochs_before_the_newest_plan(numbers: set[int], c
 
 def test_the_share_is_that_of_the_peers_that_are_heard() -> None:
     one = agreements(OWN)
-    assert one.received(NOW, 10) is None
+    assert one.peers.received(NOW, 10) is None
     now = NOW + 10 * LENGTH
     for system, step in ((OTHER, 1), (THIRD, 5)):
         for number in range(0, 11, step):
             one.receive_plan(now, system, pack(plan(number, x=4.0 * system)))
-    assert one.received(now, 10) == pytest.approx((1.0 + 0.2) / 2)
+    assert one.peers.received(now, 10) == pytest.approx((1.0 + 0.2) / 2)
     one.receive_statement(now, THIRD, Statement(FRAME, epoch(10), epoch(0), away=True))
-    assert one.received(now, 10) == 1.0
-    assert one.received(now + 5_000_001, 10) is None
+    assert one.peers.received(now, 10) == 1.0
+    assert one.peers.received(now + 5_000_001, 10) is None
     one.receive_statement(now, THIRD, statement(11))
-    assert one.received(now, 10) == pytest.approx((1.0 + 0.2) / 2)
+    assert one.peers.received(now, 10) == pytest.approx((1.0 + 0.2) / 2)
     # Its farewell is accepted: it makes no more plans.
     one.receive_plan(now, THIRD, pack(plan(11, x=12.0)))
     answer = Entry(OWN, (), (epoch(11), epoch(0)))
     one.receive_statement(now + LENGTH, THIRD, statement(11, answer, farewell=True))
-    assert one.received(now, 10) == 1.0
+    assert one.peers.received(now, 10) == 1.0
 
 
 class Datagrams(Swarm):

@@ -97,11 +97,11 @@ def test_who_has_landed_does_not_give_way_to_a_column() -> None:
     two = agreed()
     two.make(OWN, plan(1)._replace(column=True))
     two.first.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, 1.2)._replace(column=True)))
-    assert two.first.columns == {OTHER}
+    assert two.first.peers.columns == {OTHER}
     assert two.first.near() == {OTHER}
     two.first.receive_statement(NOW + LENGTH, OTHER, leaving(1))
-    assert two.first.left.keys() == {OTHER}
-    assert two.first.columns == set()
+    assert two.first.peers.left.keys() == {OTHER}
+    assert two.first.peers.columns == set()
 
 
 def test_the_wait_for_a_reservation_asks_once_who_has_agreed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,7 +65,7 @@ def test_a_vehicle_leaves_a_ring_of_vehicles_at_their_goals_and_all_are_at_their
 
 
 def test_without_room_it_stays_in_the_ring(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Room, "destination", lambda _self, _now, _epoch, _rest, goal, _agreements: goal)
+    monkeypatch.setattr(Room, "destination", lambda _self, _now, _epoch, _rest, goal, _peers: goal)
     around = ring(8, 2.0)
     assert off(flown(around), np.vstack([GOAL, around]), 30_000_000)[0] > 3.0
 
@@ -103,11 +103,11 @@ class Standing:
 
     def place(self, now: int, rest: Array | None = None) -> Array:
         """Where it goes at ``now`` µs, (3,), m."""
-        agreements: Any = SimpleNamespace(
+        peers: Any = SimpleNamespace(
             left={}, columns=(), resting=lambda *_: self._others, ends=lambda: self._ends | self._others
         )
         rest = self.here if rest is None else rest
-        return self.room.destination(now, 0, rest, self.here, agreements)
+        return self.room.destination(now, 0, rest, self.here, peers)
 
     def asks(self, rest: Array, onwards: Array, *, closed: bool = False) -> WireRoom | None:
         """What it asks for on its way ``onwards`` (3,), m, from the end of its plan ``rest`` (3,), m."""

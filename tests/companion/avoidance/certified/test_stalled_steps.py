@@ -75,7 +75,7 @@ def test_a_recalled_plan_that_stays_filed_is_found(monkeypatch: pytest.MonkeyPat
 def test_what_is_recalled_never_was() -> None:
     """A plan is filed, an offer taken that replaces an agreement, and another one proposed."""
     two = agreed()
-    mine, peer = two.first, two.first._peers[OTHER]
+    mine, peer = two.first, two.first.peers.counted[OTHER]
     before = peer.pair.kept, peer.pair.considered, dict(peer.agreed), mine._plans.newest
     mine.made(plan(1))
     peer.agree(Agreement(epoch(0), epoch(1)), before[2][before[0][-1]])

@@ -284,7 +284,7 @@ def test_who_left_is_not_waited_for() -> None:
     swarm.run(9_000_000, goals(2))
     assert not swarm.faults()
     for vehicle in swarm.vehicles[1:]:
-        assert set(vehicle.flight.agreements.left) == {1}
+        assert set(vehicle.flight.agreements.peers.left) == {1}
         assert any(made.since > 4_000_000 for made in vehicle.made)
 
 

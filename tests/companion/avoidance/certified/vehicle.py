@@ -194,7 +194,7 @@ class Vehicle:
         if steers and flight.due(now):
             epoch = flight.commitment.epoch(now)
             beside = flight.agreements.kept()
-            left = {system: last.plan for system, last in flight.agreements.left.items()}
+            left = {system: last.plan for system, last in flight.agreements.peers.left.items()}
             found = flight.plan(now, standing(goal, None)._replace(given=True), self.world, _NOTHING)
             self.made.append(Made(self.system, since, epoch, beside, left, dict(self._begun), found))
 
@@ -210,7 +210,7 @@ class Vehicle:
 
     def confirmed(self, system: int) -> bool:
         """Whether it may plan beside ``system`` because of an agreement."""
-        return system in self.flight.agreements.members - self.flight.agreements.missing()
+        return system in self.flight.agreements.peers.members - self.flight.agreements.missing()
 
     def keeps(self) -> list[tuple[int, Agreement, AgreedPlanes]]:
         """The agreements that it keeps now, with whom, and what it takes for their plans."""
