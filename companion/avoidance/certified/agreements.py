@@ -29,9 +29,9 @@ from mavlink_bridge.wire.plan import WirePlan
 class Agreements:
     """Agreements of the vehicle ``own`` (system id) in a ``fleet``.
 
-    ``beyond``: see ``Peers``. ``steps``: number of knots of every plan. ``since``: epoch (µs) of the first
-    plan since which each own plan began on the one before; it changes when the vehicle returns, not at its
-    farewell. ``refused`` counts the messages that were not accepted.
+    ``plans``: the own plans. ``steps``: number of knots of every plan. ``beyond``: see ``Peers``. ``since``:
+    epoch (µs) of the first plan since which each own plan began on the one before; it changes when the
+    vehicle returns, not at its farewell. ``refused`` counts the messages that were not accepted.
     """
 
     def __init__(
@@ -46,8 +46,8 @@ class Agreements:
         self.own = own
         self.peers = Peers(own, config, beyond)
         self._config, self._fleet = config, fleet
-        self._plans = PlanFile()
-        self._negotiation = Negotiation(self._plans, steps, geometry)
+        self.plans = PlanFile()
+        self.negotiation = Negotiation(self.plans, steps, geometry)
         self._checks = SenderChecks(config, steps, fleet)
         self._farewell: int | None = None
         self._before: dict[int, Lists] | None = None
@@ -122,7 +122,7 @@ class Agreements:
     def begin(self, since: int) -> None:
         """Discard all agreements: the own plan of ``since`` (µs) does not begin on the one before."""
         self.since, self._farewell, self._before = since, None, None
-        self._plans.clear()
+        self.plans.clear()
         for peer in self.peers.everybody():
             peer.begin()
 
@@ -148,11 +148,11 @@ class Agreements:
 
     def made(self, plan: WirePlan) -> bool:
         """File the own newest plan, which keeps all agreements of the lists; return whether it is new."""
-        newest = self._plans.newest
+        newest = self.plans.newest
         if newest is not None and newest.plan is plan:
             return False
         self._before = {system: peer.lists() for system, peer in self.peers.counted.items()}
-        self._plans.add(
+        self.plans.add(
             stored(plan), {epoch for peer in self.peers.counted.values() for epoch in peer.needed()}
         )
         return True
@@ -163,10 +163,10 @@ class Agreements:
         Nothing of this was sent, and what was taken since may rely on this plan. Returns False, and changes
         nothing, if anything was received since, or the vehicle has begun anew or said farewell.
         """
-        newest, before = self._plans.newest, self._before
+        newest, before = self.plans.newest, self._before
         if before is None or newest is None or newest.plan.epoch != epoch:
             return False
-        self._plans.remove(epoch)
+        self.plans.remove(epoch)
         self._before = None
         for system, lists in before.items():
             self.peers.counted[system].undo(lists)
@@ -174,7 +174,7 @@ class Agreements:
 
     def update(self, now: int) -> None:
         """Take, propose and refuse agreements, with the own newest plan."""
-        newest = self._plans.newest
+        newest = self.plans.newest
         if newest is None or newest.plan.epoch < self.since or self._farewell is not None:
             return
         for peer in self.peers.counted.values():
@@ -182,7 +182,7 @@ class Agreements:
             if settled or peer.left is not None or peer.doubted(now):
                 continue
             if peer.stated and peer.plans.newest is not None:
-                self._negotiation.advance(now, peer, newest, self.since)
+                self.negotiation.advance(now, peer, newest, self.since)
 
     @property
     def fingerprint(self) -> int:
@@ -208,52 +208,6 @@ class Agreements:
         peers = ((system, self.peers.counted.get(system)) for system in self.peers.members)
         return {system for system, peer in peers if peer is None or peer.pair.confirmed is None}
 
-    def unreserved(self) -> set[int]:
-        """Return the vehicles beside which the own newest plan, a column, is not reserved.
-
-        They are the members without an agreement on an own column that both state, those with which another
-        agreement is still kept, and departed ones whose last plan is too near.
-        """
-        return self.missing() | self._in_space() | self.near(self.peers.left)
-
-    def on_columns(self) -> bool:
-        """Return whether all agreements that are kept are on own columns, so that all planes are upright."""
-        return not self._in_space()
-
-    def _in_space(self) -> set[int]:
-        """Return the vehicles with which an agreement is kept that is not on an own column."""
-        return {
-            system
-            for system, peer in self.peers.counted.items()
-            if peer.left is None and not all(self._on_column(one) for one in peer.pair.kept)
-        }
-
-    def _on_column(self, one: Agreement) -> bool:
-        own = self._plans.get(one.own)
-        return own is not None and own.plan.column
-
-    def near(self, plans: dict[int, StoredPlan] | None = None, column: WirePlan | None = None) -> set[int]:
-        """Return the systems of which one of the ``plans`` is too near for an agreement with a ``column``.
-
-        Without ``column``: that of the own newest plan. Without ``plans``: the newest that are known.
-        """
-        newest = self._plans.newest if column is None else stored(column)
-        if plans is None:
-            known = {system: peer.left or peer.plans.newest for system, peer in self.peers.counted.items()}
-            plans = {system: plan for system, plan in known.items() if plan is not None}
-        if newest is None:
-            return set()
-        own = newest._replace(plan=newest.plan._replace(column=True))
-        return {system for system, plan in plans.items() if not self._negotiation.clear(own, plan)}
-
-    def clear(self, systems: set[int]) -> bool:
-        """Return whether the newest plans of ``systems`` are known, and far enough from the own column."""
-        known = {
-            system: peer.plans.newest for system, peer in self.peers.counted.items() if system in systems
-        }
-        plans = {system: plan for system, plan in known.items() if plan is not None}
-        return plans.keys() == systems and not self.near(plans)
-
     def outdated(self, now: int, epoch: int) -> bool:
         """Return whether an agreement on the plans of ``epoch`` (µs) may soon replace an older one.
 
@@ -261,7 +215,7 @@ class Agreements:
         not counted.
         """
         lately = self.peers.lately(now, self._config.gone_us)
-        return any(not self._negotiation.current(peer, epoch) for peer in lately)
+        return any(not self.negotiation.current(peer, epoch) for peer in lately)
 
     def agreed(self) -> list[AgreedPlanes]:
         """Return the planes of all agreements that are kept, in the order of system ids.
@@ -285,8 +239,8 @@ class Agreements:
         epochs = {
             one.own for peer in self.peers.counted.values() if peer.left is None for one in peer.pair.open
         }
-        found = [self._plans.get(epoch) for epoch in sorted(epochs)]
-        return [one.plan for one in found if one is not None and one is not self._plans.newest]
+        found = [self.plans.get(epoch) for epoch in sorted(epochs)]
+        return [one.plan for one in found if one is not None and one is not self.plans.newest]
 
     @property
     def changed(self) -> bool:

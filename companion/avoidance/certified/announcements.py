@@ -93,7 +93,7 @@ class Announcements:
                 return False
             if start is not None and start != announced:
                 commitment.carry_on(HoldReason.LATE)
-            if self._agreements.unreserved() or not commitment.column:
+            if self._reservation.columns.unreserved() or not commitment.column:
                 self._reservation.withdraw()
             commitment.announced_until = before
         # The statements, too, are to be repeated at once.

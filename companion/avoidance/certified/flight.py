@@ -234,7 +234,7 @@ class CertifiedFlight:
 
     def _hover(self, height: float) -> None:
         """Fly the column at ``height`` (m), while all agreements that are kept have upright planes."""
-        if self.agreements.on_columns():
+        if self.reservation.columns.on_columns():
             self.commitment.hover(height)
 
     def _hold_column(self, now: int) -> bool:

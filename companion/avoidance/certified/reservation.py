@@ -13,6 +13,7 @@ from __future__ import annotations
 from math import hypot, inf
 
 from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.column_agreements import ColumnAgreements
 from companion.avoidance.certified.commitment import Commitment
 from companion.avoidance.certified.committed import rest_time
 from companion.config.certified import CertifiedConfig
@@ -25,7 +26,7 @@ _MOVED = 0.5
 
 
 class Reservation:
-    """Reservation of the column of one vehicle.
+    """Reservation of the column of one vehicle; ``columns``: its agreements on columns.
 
     ``beside`` (m): how far from its column a parked vehicle may report its position. ``joined``: the vehicle
     takes part; otherwise it is parked, or its companion has not begun. ``was_reserved``: the own newest plan
@@ -36,6 +37,7 @@ class Reservation:
         self, config: CertifiedConfig, commitment: Commitment, agreements: Agreements, beside: float
     ) -> None:
         self._config, self._commitment, self._agreements = config, commitment, agreements
+        self.columns = ColumnAgreements(agreements)
         self._parks_within = beside
         self._joins_within = _MOVED * max(config.drift, config.tube)
         self._since: int | None = None
@@ -50,24 +52,24 @@ class Reservation:
         agreement, because the other vehicle could then make no plan either. While it waits for that it keeps
         its column, as a parked vehicle does: a column that is begun anew is announced an epoch later.
         """
-        commitment, agreements = self._commitment, self._agreements
+        commitment, agreements, columns = self._commitment, self._agreements, self.columns
         off = self._off(place)
         within = self._joins_within if self.joined and joins else self._parks_within
         column = None
         self._in_the_way = set()
         if joins and not self.joined and _STANDS_M < off <= within:
             column = commitment.column_at(now, place)
-            self._in_the_way = agreements.near(column=column)
+            self._in_the_way = columns.near(column=column)
         if off > within or (column is not None and not self._in_the_way):
             agreements.begin(commitment.begin(now, place, column=True))
             self._since, self.was_reserved = None, False
         newest = commitment.announced()
         if newest is not None:
             agreements.made(newest)
-        if self.joined and (not joins or (agreements.unreserved() and agreements.near())):
+        if self.joined and (not joins or (columns.unreserved() and columns.near())):
             self.joined = False
             self._since, self.was_reserved = None, False
-        elif joins and not self.joined and not (self._in_the_way or agreements.near()):
+        elif joins and not self.joined and not (self._in_the_way or columns.near()):
             agreements.rejoin()
             # A reservation of the last flight ended with the agreements, at the farewell.
             self._since, self.was_reserved, self.joined = None, False, True
@@ -86,7 +88,7 @@ class Reservation:
         It may not while a known plan is too near for an agreement: without a column it can move aside. Of two
         columns that are too near, the one of the vehicle with the lower system id stays.
         """
-        near = self._agreements.near()
+        near = self.columns.near()
         if near and self._commitment.column:
             near -= {system for system in self._agreements.peers.columns if system > self._agreements.own}
         return not near
@@ -97,7 +99,7 @@ class Reservation:
         ``listens``: with a range, the companion may have heard too little yet of vehicles within it.
         """
         column = self._commitment.column
-        if not column or listens or self._agreements.unreserved():
+        if not column or listens or self.columns.unreserved():
             self._since = None
         elif self._since is None:
             self._since = now
@@ -114,7 +116,7 @@ class Reservation:
         was kept away from it by its plan before. It need not agree again, if its newest plan is away as well.
         """
         missing = self._agreements.missing()
-        return not missing or (self.was_reserved and self._agreements.clear(missing))
+        return not missing or (self.was_reserved and self.columns.clear(missing))
 
     def _lasts(self, now: int) -> bool:
         """Return whether at the last ``watch`` nothing had been missing for long enough at ``now`` (µs).
@@ -129,11 +131,11 @@ class Reservation:
         """Return what the autopilot must wait for at ``now`` (µs), or an empty string."""
         if not self._commitment.column:
             return "its column"
-        unreserved = self._agreements.unreserved()
+        unreserved = self.columns.unreserved()
         if self._lasts(now) and not unreserved:
             horizon = self._commitment.horizon()
             return "" if horizon is None or now >= rest_time(horizon) else "the end of its plan"
-        near = self._in_the_way | self._agreements.near()
+        near = self._in_the_way | self.columns.near()
         if near:
             return f"room for its column: the plan of {_listed(near)} is too near"
         return f"the agreement of {_listed(unreserved)} on its column" if unreserved else "its column"

@@ -46,7 +46,7 @@ def without_the_oldest_planes(patch: pytest.MonkeyPatch) -> None:
     agreed = Agreements.agreed
 
     def newest(self: Agreements) -> list[AgreedPlanes]:
-        counts = [len(peer.pair.kept) for _, peer in sorted(self._peers.items())]
+        counts = [len(peer.pair.kept) for _, peer in sorted(self.peers.counted.items())]
         whole = agreed(self)
         return [whole[end - 1] for count, end in zip(counts, accumulate(counts), strict=True) if count]
 
@@ -57,8 +57,8 @@ def against_stale_plans(patch: pytest.MonkeyPatch) -> None:
     """Planes are computed from a plan of the peer that is two epochs older."""
 
     def stale(self: Agreements) -> list[AgreedPlanes]:
-        negotiation, two = self._negotiation, 2 * self._config.epoch_us
-        kept = [(peer, one) for peer in self._peers.values() for one in peer.pair.kept]
+        negotiation, two = self.negotiation, 2 * self._config.epoch_us
+        kept = [(peer, one) for peer in self.peers.counted.values() for one in peer.pair.kept]
         pairs = [(peer, negotiation.plans_of(peer, one)) for peer, one in kept]
         return [
             made(own, peer.plans.get(other.plan.epoch - two) or other, negotiation._geometry.agreed)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.column_agreements import ColumnAgreements
 from companion.avoidance.certified.columns import Distances
 from companion.avoidance.certified.negotiation import Negotiation
 from companion.avoidance.certified.separating_planes import agreed_planes
@@ -119,13 +119,13 @@ def ignore_the_column(patch: pytest.MonkeyPatch) -> None:
 
 
 def agree_nearer_than_allowed(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Agreements, "near", lambda self, plans=None, column=None: set())
+    patch.setattr(ColumnAgreements, "near", lambda self, plans=None, column=None: set())
     patch.setattr(Negotiation, "_reservable", lambda self, newest, plans: True)
 
 
 def keep_planes_in_space(patch: pytest.MonkeyPatch) -> None:
     """The landing begins though an agreement on a plan in space is kept."""
-    patch.setattr(Agreements, "_on_column", lambda self, one: True)
+    patch.setattr(ColumnAgreements, "_on_column", lambda self, one: True)
 
 
 def look_at_heights(patch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from companion.avoidance.certified.agreements import Agreements
+from companion.avoidance.certified.column_agreements import ColumnAgreements
 from companion.avoidance.certified.committed import resting
 from companion.avoidance.certified.flight import CertifiedFlight
 from companion.avoidance.certified.reservation import Reservation
@@ -31,14 +31,14 @@ def test_planes_are_upright_only_once_no_agreement_on_a_plan_in_space_is_kept() 
     """Until then a column must not be flown, or become a plan in space, at another height."""
     two = agreed()
     for number in (1, 2):
-        assert not two.first.on_columns()
+        assert not ColumnAgreements(two.first).on_columns()
         for system, x in ((OWN, 0.0), (OTHER, 4.0)):
             two.make(system, plan(number, x)._replace(column=system == OWN))
-        assert not two.first.on_columns()
+        assert not ColumnAgreements(two.first).on_columns()
         two.agree(NOW + number * LENGTH)
-        if two.first.on_columns():
+        if ColumnAgreements(two.first).on_columns():
             break
-    assert two.first.on_columns()
+    assert ColumnAgreements(two.first).on_columns()
 
 
 @pytest.mark.parametrize(("x", "clear"), [(1.2, False), (4.0, True), (None, False)])
@@ -49,7 +49,7 @@ def test_who_can_meet_a_column_is_near_or_unknown(x: float | None, clear: bool) 
     if x is not None:
         one.receive_plan(NOW, OTHER, pack(plan(x=x)._replace(column=True)))
     assert one.missing() == {OTHER}
-    assert one.clear({OTHER}) is clear
+    assert ColumnAgreements(one).clear({OTHER}) is clear
 
 
 @pytest.mark.parametrize(("reserved", "x"), [(False, 9.0), (True, 9.0), (True, 1.0)])
@@ -98,7 +98,7 @@ def test_who_has_landed_does_not_give_way_to_a_column() -> None:
     two.make(OWN, plan(1)._replace(column=True))
     two.first.receive_plan(NOW + LENGTH, OTHER, pack(plan(1, 1.2)._replace(column=True)))
     assert two.first.peers.columns == {OTHER}
-    assert two.first.near() == {OTHER}
+    assert ColumnAgreements(two.first).near() == {OTHER}
     two.first.receive_statement(NOW + LENGTH, OTHER, leaving(1))
     assert two.first.peers.left.keys() == {OTHER}
     assert two.first.peers.columns == set()
@@ -107,7 +107,7 @@ def test_who_has_landed_does_not_give_way_to_a_column() -> None:
 def test_the_wait_for_a_reservation_asks_once_who_has_agreed(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
     often: list[int] = []
-    unreserved, missing = Agreements.unreserved, Reservation.missing
+    unreserved, missing = ColumnAgreements.unreserved, Reservation.missing
 
     def counted(reservation: Reservation, now: int) -> str:
         asked.clear()
@@ -115,7 +115,7 @@ def test_the_wait_for_a_reservation_asks_once_who_has_agreed(monkeypatch: pytest
         often.append(len(asked))
         return found
 
-    monkeypatch.setattr(Agreements, "unreserved", lambda self: asked.append(1) or unreserved(self))
+    monkeypatch.setattr(ColumnAgreements, "unreserved", lambda self: asked.append(1) or unreserved(self))
     monkeypatch.setattr(Reservation, "missing", counted)
     fly([Habits(takes_off=0), Habits()], Rough(), 1, 1_500_000)
     assert often
