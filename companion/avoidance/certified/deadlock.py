@@ -36,6 +36,8 @@ _MIN_PULL_DISTANCE_M = 0.5
 _MIN_GAIN_M = 0.05
 _REACHED_M = 0.1
 """Progress: the rest point is nearer to the goal than ``_REACHED_M``, or ``_MIN_GAIN_M`` nearer than ever."""
+_ANOTHER_M = 0.5
+"""Distance by which a destination at rest must have moved before it counts as another one."""
 _STANDS_S, _STANDS_M = 1.0, 0.25
 """Time (s) for which the rest point stays within a distance (m) of one place before the plan stands."""
 _IN_VAIN_S = 5.0
@@ -62,6 +64,7 @@ class DeadlockTurn:
         self._config, self._sense = config, sense
         self.angle = 0.0
         """Angle (rad) by which the goal is turned now, to the side of ``sense``."""
+        self._destination: Array | None = None
         self._distance: float | None = None
         self._best = np.inf
         self._waited = 0.0
@@ -105,6 +108,17 @@ class DeadlockTurn:
         config = self._config
         return config.patience + (config.bend_more - config.bend) / config.slow
 
+    def measure_to(self, destination: Array) -> None:
+        """Measure progress anew if the ``destination`` (3,), m, which is at rest, is another one.
+
+        Otherwise a vehicle that has reached a goal would make no progress to the next one, because it was
+        never nearer to that than to the first.
+        """
+        last = self._destination
+        if last is None or np.abs(destination - last).max() > _ANOTHER_M:
+            self._destination = destination.copy()
+            self.restart()
+
     def give_up(self) -> None:
         """End the turn and measure progress anew, if there was none for ``_IN_VAIN_S`` after it was full.
 
@@ -116,7 +130,7 @@ class DeadlockTurn:
             self.restart()
 
     def restart(self) -> None:
-        """Measure progress anew, because the way to the goal is another one."""
+        """Measure progress anew, because the goal or the way to it is another one."""
         self._distance, self._best = None, np.inf
         self._stood_at, self._stood = None, 0.0
 

@@ -7,6 +7,10 @@ import pytest
 
 from companion.avoidance.certified.deadlock import DeadlockTurn, Pushes
 from companion.config.certified import DeadlockConfig
+from companion.values.horizon import Array
+from tests.companion.avoidance.certified.plans import EPOCH
+from tests.companion.avoidance.certified.rough import Habits, Rough
+from tests.companion.avoidance.certified.swarm import Swarm
 
 GOAL = np.array([8.0, 0.0, 5.0])
 REST = np.array([0.0, 0.0, 5.0])
@@ -55,3 +59,36 @@ def test_a_plan_stands_whose_end_stays_about_one_place_that_is_not_the_goal() ->
     assert not stands(0.5 * RIGHT)
     assert not stands(still, goal=REST)
     assert not stands(still, moving=True)
+
+
+def test_a_second_goal_is_measured_from_where_it_was_given_and_one_that_hardly_moves_is_the_same() -> None:
+    """A vehicle that has been at its first goal was never nearer to the second one than to that."""
+    turn, nobody = DeadlockTurn(DeadlockConfig()), Pushes(np.empty((0, 3)), np.empty((0, 3)))
+    rest = REST
+    for goal in (REST, GOAL):
+        for _ in range(25):
+            turn.measure_to(goal)
+            rest = rest + 0.05 * (goal - rest)
+            turn.learn(rest, goal, nobody, 1.0, 0.2)
+            assert not turn.overtime
+    for k in range(25):
+        turn.measure_to(GOAL + 0.01 * k * AHEAD)
+        turn.learn(rest, GOAL, nobody, 1.0, 0.2)
+    assert turn.stalled
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_vehicle_on_the_way_to_its_second_goal_is_not_overtime(planar: bool) -> None:
+    """It is at its first goal for 3 s, and then needs 8 s for 20 m, with nobody in its way."""
+    first, second = np.array([0.0, 0.0, 5.0]), np.array([20.0, 0.0, 5.0])
+    swarm = Swarm(first[None], Rough(), [Habits()], 1, planar=planar, v_max=(3.0, 3.0, 2.0))
+    turn = swarm.vehicles[0].flight._deadlock_turn
+    overtime: list[bool] = []
+
+    def goals(since: int, _system: int) -> Array:
+        overtime.append(turn.overtime)
+        return first if since < 3_000_000 else second
+
+    swarm.run(12_000_000, goals)
+    assert np.abs(swarm.vehicles[0]._flown(EPOCH + 12_000_000).position - second).max() < 0.1
+    assert not any(overtime)
