@@ -5,8 +5,8 @@ a semismooth Newton method", 2003): with a guess of what binds, the minimiser wi
 system; free variables beyond a bound are then fixed to it, and what is held with a multiplier of the wrong
 sign is released, all at once. Where this cycles, one variable changes at a time (K. G. Murty's rule, which
 ends). The first rows join together, each with a variable that keeps it; then one joins at a time, the most
-violated first. The result is a guess that the caller must verify. Search and verification share parts,
-and a kernel and its parts must be in one file: that makes it long.
+violated first. The result is a guess that the caller must verify. Search and verification share parts: that
+makes it long.
 """
 
 from __future__ import annotations

@@ -1,20 +1,24 @@
 """Compilation of the planner's arithmetic by numba: double precision, no fast-math, no reassociation.
 
 A kernel is compiled for fixed argument types when its module is imported, and its machine code is kept on
-disk, so nothing is compiled in flight. A part is inlined into the kernels of its module that call it. Numba
-compiles a stored kernel again only if the kernel's own file has changed: so a kernel and its parts must be in
-the same file.
+disk, so nothing is compiled in flight. A part is inlined into the kernels that call it. Numba compiles a
+stored kernel again only if the kernel's own file has changed; here it does so too if another file has changed
+from which a kernel, or a part of it, imports parts by their names. A constant has to be in the file of the
+kernel or part that uses it.
 """
 
 from __future__ import annotations
 
+import hashlib
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 from numba import types
 from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 
 
 def _load_array_functions() -> None:
@@ -67,7 +71,13 @@ def kernel(result: Any, *arguments: Any) -> Callable[[_F], _F]:
 
     def compiled(function: _F) -> _F:
         def compile_(*, stored: bool) -> Any:
-            return numba.njit(signature, error_model="numpy", cache=stored)(function)
+            found = cast(Any, numba.njit(error_model="numpy")(function))
+            if stored:
+                found.enable_caching()
+                _watch_other_files(found)
+            found.compile(signature)
+            found.disable_compile()
+            return found
 
         # A damaged file may raise any error while numba reads it.
         try:
@@ -83,6 +93,28 @@ def kernel(result: Any, *arguments: Any) -> Callable[[_F], _F]:
         return cast(_F, found)
 
     return compiled
+
+
+def _watch_other_files(kernel: Any) -> None:
+    """Add a digest of the other files that parts of a kernel come from to the stamp of its stored code.
+
+    Numba offers no other way to compile it again after a change of these.
+    """
+    files, found, seen = set[str](), [kernel.py_func], set[Any]()
+    while found:
+        function = found.pop()
+        seen.add(function)
+        files.add(function.__code__.co_filename)
+        used = (function.__globals__.get(name) for name in function.__code__.co_names)
+        found += [one.py_func for one in used if isinstance(one, Dispatcher) and one.py_func not in seen]
+    files.remove(kernel.py_func.__code__.co_filename)
+    if not files:
+        return
+    digest = hashlib.sha256()
+    for file in sorted(files):
+        digest.update(Path(file).read_bytes())
+    store = kernel._cache._cache_file
+    store._source_stamp = store._source_stamp, digest.digest()
 
 
 def _free_intermediate_code(loaded: Any) -> None:

@@ -19,6 +19,35 @@ def twice(x):
 
 print("twice", twice(4.0), "loaded" if twice.stats.cache_hits else "compiled")
 """
+WITH_PARTS = """
+from companion.values.compiled import FLOAT, kernel
+from doubled import doubled
+
+
+@kernel(FLOAT, FLOAT)
+def twice(x):
+    return doubled(x)
+
+
+print("twice", twice(4.0), "loaded" if twice.stats.cache_hits else "compiled")
+"""
+DOUBLED = """
+from companion.values.compiled import part
+from factor import times
+
+
+@part
+def doubled(x):
+    return times(x)
+"""
+FACTOR = """
+from companion.values.compiled import part
+
+
+@part
+def times(x):
+    return 2.0 * x
+"""
 READ_ONLY = """
 import tempfile
 
@@ -41,9 +70,9 @@ IndexDataCacheFile._open_for_write = refused
 """
 
 
-def start(folder: Path, before: str = "") -> list[str]:
-    """Run the module in ``folder`` as a process, after the code ``before``; return its lines."""
-    (folder / "kernels.py").write_text(MODULE)
+def start(folder: Path, before: str = "", module: str = MODULE) -> list[str]:
+    """Run the ``module`` in ``folder`` as a process, after the code ``before``; return its lines."""
+    (folder / "kernels.py").write_text(module)
     command = [sys.executable, "-c", f"{before}\nimport kernels"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     return done.stdout.splitlines()
@@ -52,6 +81,16 @@ def start(folder: Path, before: str = "") -> list[str]:
 def test_the_second_start_loads(tmp_path: Path) -> None:
     assert start(tmp_path) == ["twice 8.0 compiled"]
     assert start(tmp_path) == ["twice 8.0 loaded"]
+
+
+def test_a_part_of_a_part_that_changes_in_another_file_is_compiled_again(tmp_path: Path) -> None:
+    (tmp_path / "doubled.py").write_text(DOUBLED)
+    (tmp_path / "factor.py").write_text(FACTOR)
+    assert start(tmp_path, module=WITH_PARTS) == ["twice 8.0 compiled"]
+    assert start(tmp_path, module=WITH_PARTS) == ["twice 8.0 loaded"]
+    (tmp_path / "factor.py").write_text(FACTOR.replace("2.0", "3.00"))
+    assert start(tmp_path, module=WITH_PARTS) == ["twice 12.0 compiled"]
+    assert start(tmp_path, module=WITH_PARTS) == ["twice 12.0 loaded"]
 
 
 @pytest.mark.slow
