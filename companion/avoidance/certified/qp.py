@@ -22,18 +22,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.avoidance.certified.active_set import Effects, active_set, effects
 from companion.avoidance.certified.cost import arriving, following
+from companion.avoidance.certified.minimiser import combine
 from companion.avoidance.certified.qp_vectors import write_cost
-from companion.avoidance.certified.rows import (
-    BOUND,
-    Effects,
-    active_set,
-    combine,
-    effects,
-    row_slacks,
-    rows_within,
-    write_rows,
-)
+from companion.avoidance.certified.rows import BOUND, row_slacks, rows_within, write_rows
 from companion.avoidance.certified.separating_planes import Planes
 from companion.avoidance.solver import equation_solver, solve_once
 from companion.config.certified import CertifiedConfig

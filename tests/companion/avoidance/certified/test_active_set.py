@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from companion.avoidance.certified.rows import active_set, combine, effects, write_rows
+from companion.avoidance.certified.active_set import active_set, effects
+from companion.avoidance.certified.minimiser import combine
+from companion.avoidance.certified.rows import write_rows
 from companion.values.horizon import Array
 from companion.values.prediction import prediction
 
