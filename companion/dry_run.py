@@ -12,7 +12,6 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
-from companion.flight.readiness import Readiness
 from companion.node import Companion
 from companion.shadow import Onlooker, ShadowCompanion
 from companion.world import View
@@ -48,8 +47,7 @@ class _RequestingOnlooker(Onlooker):
 
     def __init__(self, config: CompanionConfig, own: Source, origin_altitude: float) -> None:
         # With its own component id the answers do not mix with those to the companion's requests.
-        super().__init__(config, own._replace(component=ONLOOKER), origin_altitude)
-        self._readiness = Readiness(config, self.vehicle, self._commands, slow=True)
+        super().__init__(config, own._replace(component=ONLOOKER), origin_altitude, slow=True)
         self._began: int | None = None
         self._received: set[int] = set()
         self._arrived: dict[int, int] = {}
@@ -63,7 +61,7 @@ class _RequestingOnlooker(Onlooker):
         """Update the phase; return nothing but requests for messages and parameters."""
         super().step(now, view)
         self._readiness.arriving = self._arriving(now)
-        self.lacking = self._readiness.missing(view, go=self._height is not None)
+        self.lacking = self._readiness.missing(view, go=self._go.height is not None)
         wishes = self._readiness.wishes(now) if self._readiness.received else []
         return [*self._readiness.requests(now), *wishes]
 

@@ -8,6 +8,7 @@ and are therefore not supported.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import ClassVar
 
 from companion.config import CompanionConfig
 from companion.config.flight import TrackingConfig
@@ -72,7 +73,7 @@ class ShadowCompanion(Companion):
     CompanionError for ``avoidance: certified``.
     """
 
-    pilots = Onlooker
+    pilots: ClassVar[type[Pilot]] = Onlooker
 
     def __init__(
         self,

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
-from companion.flight.autopilots import Profile
+from companion.flight.autopilots import Loop, Profile
 from companion.flight.autopilots.limits import stock_parameters
 from companion.flight.lowering import Lowered, lowered
 from companion.flight.vehicle import Vehicle
@@ -112,6 +112,12 @@ class AutopilotLimits:
         if not self._on:
             return ""
         return UNREAD if self._found is None else self.lowered.lacking
+
+    @property
+    def loop(self) -> Loop | None:
+        """Loop gains of the autopilot, None for an unknown one."""
+        profile = self._vehicle.profile
+        return self.lowered.loop or (None if profile is None else profile.loop)
 
     @property
     def refuses(self) -> bool:

@@ -10,7 +10,11 @@ from __future__ import annotations
 
 from enum import Enum
 
+from pymavlink.dialects.v20 import all as mavlink
+
+from companion.flight.command_protocol import Commands
 from companion.flight.vehicle import Vehicle
+from mavlink_bridge.messages import Message
 
 _MAX_GAP_US = 500_000
 """µs between set-points beyond which PX4's time-out (COM_OF_LOSS_T) may have ended the mode."""
@@ -30,13 +34,17 @@ class Owner(Enum):
 
 
 class ControlAuthority:
-    """Determines the owner of the vehicle.
+    """Determines the owner of the vehicle, and requests the guided mode where a time-out has ended it.
 
-    ``streamed`` must be called for every set-point sent, and ``owner`` in every step of an escort.
+    ``streamed`` must be called for every set-point sent, ``update`` in every step in which set-points are to
+    steer, and ``release`` in every other step. ``calls``: the protocol that sends commands to the autopilot.
+    ``owner``: the owner at the last update; ``OURS`` since a release.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, calls: Commands) -> None:
         self._vehicle = vehicle
+        self._commands = calls
+        self.owner = Owner.OURS
         self._streamed: int | None = None
         self._gap_ended: int | None = None
         self._lost_at: int | None = None
@@ -51,7 +59,28 @@ class ControlAuthority:
             self._gap_ended = now
         self._streamed = now
 
-    def owner(self, now: int) -> Owner:
+    def update(self, now: int) -> Owner:
+        """Update the owner at ``now`` (µs), and return it."""
+        before, self.owner = self.owner, self._owner(now)
+        if self.owner is Owner.LOST and before is not Owner.LOST:
+            self._commands.forget()
+        return self.owner
+
+    def release(self) -> None:
+        """Stop the requests for the guided mode: set-points are not to steer any more.
+
+        Otherwise a vehicle that has lost this mode would never land.
+        """
+        self.owner = Owner.OURS
+
+    def requests(self, now: int) -> list[Message]:
+        """Return the request for the guided mode, if the autopilot's time-out has ended it."""
+        profile = self._vehicle.profile
+        if self.owner is not Owner.LOST or profile is None:
+            return []
+        return self._commands.call(now, mavlink.MAV_CMD_DO_SET_MODE, profile.mode_call)
+
+    def _owner(self, now: int) -> Owner:
         """Return the owner at ``now`` (µs)."""
         vehicle = self._vehicle
         if not vehicle.alive:

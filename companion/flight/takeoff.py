@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.estimation.tracks import State
 from companion.flight.autopilots import Profile, Step
 from companion.flight.command_protocol import Commands
+from companion.flight.control_authority import Passage
 from companion.flight.vehicle import Vehicle
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Message
@@ -28,6 +29,8 @@ climb.
 """
 _MAX_OVERSHOOT, _MAX_ESCORT_SPEED = 0.3, 3.0
 """m above the requested height, and m/s, beyond which the escort may not begin during the climb."""
+_MODE_REPORT_US = 1_500_000
+"""µs after the transmission of an accepted mode command; so long the mode is assumed without a heartbeat."""
 _NOT_FLYING = (mavlink.MAV_LANDED_STATE_UNDEFINED, mavlink.MAV_LANDED_STATE_ON_GROUND)
 _NAN = float("nan")
 
@@ -45,6 +48,9 @@ class Takeoff:
         self._flying_already = False
         self._at_rest_since: int | None = None
         self._step = 0
+        self._passage = Passage(0)
+        self.waiting_for = ""
+        """What the last unfinished step waits for; an empty string before the first."""
         self.asked_to_arm = 0
         """When (µs) the last arm command was sent, 0 before the first."""
 
@@ -55,6 +61,8 @@ class Takeoff:
         self._flying_already = self._vehicle.flies
         self._at_rest_since = None
         self._step = 0
+        self._passage = Passage(self._vehicle.mode)
+        self.waiting_for = ""
 
     @property
     def began_in_flight(self) -> bool:
@@ -72,7 +80,38 @@ class Takeoff:
         """
         return Step.ARM in profile.steps[: self._step] and not self._vehicle.armed
 
-    def risen(self, own: State, height: float) -> bool:
+    @property
+    def streams(self) -> bool:
+        """Whether set-points are to be sent because the autopilot requires them to enter the guided mode."""
+        profile = self._vehicle.profile
+        return (
+            self._vehicle.alive
+            and profile is not None
+            and profile.streams_first
+            and self.step(profile) is Step.MODE
+        )
+
+    def mode_accepted(self, now: int) -> bool:
+        """Return whether the autopilot has just accepted the guided mode.
+
+        PX4 reports the mode in its next heartbeat, up to a second later.
+        """
+        profile = self._vehicle.profile
+        return profile is not None and self._commands.taken(
+            now, mavlink.MAV_CMD_DO_SET_MODE, profile.mode_call, _MODE_REPORT_US
+        )
+
+    def strays(self, profile: Profile, own: State | None, height: float) -> bool:
+        """Return whether another controller has taken the vehicle over by a change of mode.
+
+        ``height``: the requested height (m above the ground).
+        """
+        ways = profile.takeoff_modes | {profile.guided_custom_mode}
+        if own is not None and self._risen(own, height):
+            ways |= {profile.hold_mode}
+        return self._passage.strays(self._vehicle.mode, ways)
+
+    def _risen(self, own: State, height: float) -> bool:
         """Return whether the climb to ``height`` (m above the ground) may be over.
 
         That is so above ``_RISEN_SHARE`` of the height, unless the take-off began in flight.
@@ -87,13 +126,12 @@ class Takeoff:
         own: State,
         height: float,
         floor: float = inf,
-        *,
-        climbs: bool = True,
+        column_waits: str = "",
     ) -> list[Message]:
         """Return the commands to send at ``now`` (µs) on the way to ``height`` (m above the ground).
 
         ``floor``: the lowest height (m, fleet-local) of plans that can take over during the climb; ∞ where
-        they cannot. ``climbs``: whether the autopilot may be ordered to climb.
+        they cannot. ``column_waits``: what the climb must wait for; an empty string: nothing.
         """
         vehicle = self._vehicle
         step = profile.steps[self._step]
@@ -113,12 +151,13 @@ class Takeoff:
             altitude = above_sea if profile.takeoff_absolute else height
             up = self._flying_already or vehicle.landed_state not in _NOT_FLYING
             climb = (0.0, 0.0, 0.0, _NAN, _NAN, _NAN, altitude)
-            waits = up or not climbs
+            waits = up or bool(column_waits)
             call = [] if waits else self._commands.call(now, mavlink.MAV_CMD_NAV_TAKEOFF, climb)
         if done:
             self._step += 1
             self._commands.forget()
             return []
+        self.waiting_for = column_waits if column_waits and step is Step.TAKEOFF else step.value
         return call
 
     def _is_up(self, now: int, own: State, climbed: float, height: float, floor: float) -> bool:

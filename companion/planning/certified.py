@@ -224,7 +224,7 @@ class CertifiedAvoidance:
 
     def _observe(self, now: int, situation: AvoidanceInputs) -> None:
         """Update the compensation, once a set-point, with how the vehicle follows the plan."""
-        tracking, horizon, loop = self.tracking, self._flight.horizon(), self._pilot.loop
+        tracking, horizon, loop = self.tracking, self._flight.horizon(), self._pilot.limits.loop
         if not self._pilot.guided:
             tracking.reset()
         elif situation.stale:

@@ -186,7 +186,7 @@ class FieldAvoidance:
 
     def _observe(self, now: int, measured: Motion) -> None:
         """Update the tracking with how the vehicle follows the set-points sent."""
-        horizon, loop = self.guard.horizon, self._pilot.loop
+        horizon, loop = self.guard.horizon, self._pilot.limits.loop
         if horizon is not None and loop is not None:
             later = horizon.at(now + self.tracking.lead(loop)).acceleration
             sent = horizon.at(now)._replace(acceleration=later)

@@ -50,7 +50,7 @@ class Planning:
         self._avoidance = avoidance
         self._heading = Heading(config.heading, config.horizon)
         self._frame: LocalFrame | None = None
-        self._lowered = pilot.lowered
+        self._lowered = pilot.planned.lowered
         self.velocities: Array = _velocities(config.limits)
         """Least and largest velocity (2, 3), m/s, as lowered by the autopilot's parameters."""
         self._stepped = 0
@@ -71,7 +71,7 @@ class Planning:
             # Positions in the old frame must not be flown to in the new one.
             self._frame = view.local
             avoidance.discard()
-        if (lowered := self._pilot.lowered) is not self._lowered:
+        if (lowered := self._pilot.planned.lowered) is not self._lowered:
             self._keep(lowered)
         avoidance.pause(now - self._stepped)
         self._stepped = now

@@ -39,7 +39,7 @@ class Setpoints:
             return []
         period = self._config.rates.setpoint_us
         self.next_due += period * (1 + (now - self.next_due) // period)
-        horizon, profile = self._avoidance.horizon, self._pilot.profile
+        horizon, profile = self._avoidance.horizon, self._pilot.vehicle.profile
         if not self._pilot.streaming or horizon is None or profile is None or view.local is None:
             return []
         time, tracking = now + self._config.setpoint_lead_us, self._avoidance.tracking
@@ -54,7 +54,7 @@ class Setpoints:
             tracking.added_acceleration,
             tracking.bias,
             self._planning.velocities,
-            tracking.lead(self._pilot.loop),
+            tracking.lead(self._pilot.limits.loop),
             tracking.added_velocity,
         )
         if not is_finite(message):

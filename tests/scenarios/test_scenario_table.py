@@ -72,7 +72,7 @@ def test_a_flight(row: Row, tmp_path: Path) -> None:
         assert (standoff["p95"] or np.inf) < row.standoff_p95_m
     if of.flavour == "ardupilot":
         # PX4 refuses OFFBOARD until set-points have flowed for a while.
-        assert [companion.pilot.refusals for companion in flight.companions] == [[]] * of.vehicles
+        assert [[*companion.pilot.commands.refusals] for companion in flight.companions] == [[]] * of.vehicles
     if of.companion.planar:
         start, end = flight.conductor.clock_start or 0, flight.conductor.clock_end
         heights = flight.truth.samples(start, end).position[..., 2]

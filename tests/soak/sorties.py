@@ -313,9 +313,8 @@ class Sorties:
         for craft in self.field.crafts:
             row = self._rows[craft.system][-1]
             pilot = craft.companion.pilot
-            how = (
-                f"{row.phase.value}, waits for {pilot.waiting_for!r}, in {craft.autopilot.mode}: {pilot.said}"
-            )
+            mode, said = craft.autopilot.mode, pilot.vehicle.said
+            how = f"{row.phase.value}, waits for {pilot.waiting_for!r}, in {mode}: {said}"
             self._must(craft, row.phase is Phase.ESCORT and pilot.guided, f"escorts after a rest: {how}")
             self._must(craft, not row.texts, f"nothing is amiss after a rest: {sorted(row.texts)}")
             off = craft.place - self.field.target.place

@@ -11,7 +11,6 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
 from companion.flight.command_protocol import Commands
-from companion.flight.state_machine import Pilot
 from companion.values.phase import Phase
 from companion.world import View
 from mavlink_bridge.messages import Message
@@ -22,7 +21,6 @@ from tests.companion.flight.rig import (
     HEALTHY,
     HEIGHT,
     ILL,
-    IN_FLIGHT,
     NOTHING,
     OWN,
     READY,
@@ -160,8 +158,8 @@ def test_a_refused_command_is_noted_and_tried_again():
     rig.sent.clear()
     for _ in range(200):
         rig.tick(beat("ardupilot"), *[ack(mavlink.MAV_CMD_DO_SET_MODE, 4)] * (rig.now % HALF == 0))
-    assert rig.pilot.refusals
-    assert set(rig.pilot.refusals) == {f"command {mavlink.MAV_CMD_DO_SET_MODE}: result 4"}
+    assert rig.pilot.commands.refusals
+    assert set(rig.pilot.commands.refusals) == {f"command {mavlink.MAV_CMD_DO_SET_MODE}: result 4"}
     assert len([1 for _, command, _ in rig.sent if command == mavlink.MAV_CMD_DO_SET_MODE]) >= 3
 
 
@@ -174,7 +172,7 @@ def test_an_acknowledgement_of_something_else_settles_nothing():
         ack(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL),
     )
     assert rig.run(1.0, beat("ardupilot"))
-    assert rig.pilot.refusals == []
+    assert not rig.pilot.commands.refusals
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -277,31 +275,3 @@ def test_plans_begin_when_the_mode_is_taken_and_end_when_no_heartbeat_shows_it(t
     assert not rig.pilot.guided
     assert rig.pilot.steers(rig.now) is taken
     assert not rig.pilot.steers(rig.now + 2_000_000)
-
-
-@pytest.mark.parametrize(
-    ("least", "floor"), [(None, 1.0), (0.2, GROUND + 0.2), (4.0, GROUND + 4.0), (90.0, 76.0)]
-)
-def test_the_floor_is_above_the_take_off_where_that_is_asked_for(least, floor):
-    """Three quarters of the box at most, so that a vehicle finds room."""
-    limits = {"box_min": (-9.0, -9.0, 1.0), "box_max": (9.0, 9.0, 101.0)}
-    config = CompanionConfig.model_validate({"guard": {"least_height": least}, "limits": limits})
-    rig = Rig()
-    rig.pilot = Pilot(config, OWN, FLEET.altitude)
-    assert rig.pilot.lowered.limits.box_min[2] == 1.0
-    rig.escorting()
-    assert rig.pilot.lowered.limits.box_min == (-9.0, -9.0, pytest.approx(floor))
-    assert rig.pilot.lowered is rig.pilot.lowered
-    assert rig.pilot.planned_limits is rig.pilot.lowered.limits
-
-
-def test_a_vehicle_that_is_taken_over_in_flight_has_no_floor_above_its_take_off():
-    rig = Rig()
-    rig.pilot = Pilot(CompanionConfig.model_validate({"guard": {"least_height": 3.0}}), OWN, FLEET.altitude)
-    rig.view = READY._replace(own=state(HEIGHT))
-    flying = beat(rig.flavour, armed=True, guided=True), IN_FLIGHT
-    rig.run(0.2, *flying, HEALTHY, acks=True)
-    assert rig.pilot.go(HEIGHT)
-    rig.run(0.2, *flying)
-    assert rig.pilot.phase is Phase.ESCORT
-    assert rig.pilot.lowered is rig.pilot.limits.lowered

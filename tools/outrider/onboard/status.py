@@ -184,10 +184,11 @@ class StatusReports:
             for remark in list(pilot.limits.remarks)[len(pilot.limits.remarks) - new :]:
                 self._event(at, "limits", remark)
             self._remarked = pilot.limits.said
-        if pilot.refused != self._refused:
-            for refusal in pilot.refusals[-(pilot.refused - self._refused) :]:
+        commands = pilot.commands
+        if commands.refused != self._refused:
+            for refusal in list(commands.refusals)[-(commands.refused - self._refused) :]:
                 self._event(at, "refused", refusal)
-            self._refused = pilot.refused
+            self._refused = commands.refused
         concerns = node.health.concerns
         if concerns is not self._concerns:
             for name, concern in concerns.items():

@@ -193,7 +193,7 @@ class Worker:
         node, statistics = self.companion, loop.statistics
         for reading in node.shed():
             news.plan_times.add(reading // 1000)
-        profile = node.pilot.profile
+        profile = node.pilot.vehicle.profile
         mask = 0 if profile is None else profile.setpoint_mask
         self._orders.tell(
             kind="figures",

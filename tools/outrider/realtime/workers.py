@@ -249,7 +249,8 @@ class CompanionWorker(Worker):
         if self.board.end and self._last is None:
             self._last = self._node.tally
         pilot = self._node.companion.pilot
-        shown = pilot.phase is Phase.ESCORT, pilot.waiting_for + (f" ({pilot.said})" if pilot.said else "")
+        said = pilot.vehicle.said
+        shown = pilot.phase is Phase.ESCORT, pilot.waiting_for + (f" ({said})" if said else "")
         if shown != self._shown:
             self._shown = shown
             self.board.show_companion(self._k, *shown)

@@ -167,7 +167,8 @@ class Vehicles:
         if motions is None:
             return None
         waiting = tuple(
-            f"{c.name} waits for {c.pilot.waiting_for}" + (f" ({c.pilot.said})" if c.pilot.said else "")
+            f"{c.name} waits for {c.pilot.waiting_for}"
+            + (f" ({c.pilot.vehicle.said})" if c.pilot.vehicle.said else "")
             for c in self.companions
             if c.pilot.phase is not Phase.ESCORT
         )
