@@ -1,7 +1,4 @@
-"""Emulated autopilot as a node: it receives datagrams, simulates the physics and returns datagrams.
-
-The module is long because it composes all parts.
-"""
+"""Emulated autopilot as a node: it receives datagrams, simulates the physics and returns datagrams."""
 
 from __future__ import annotations
 
@@ -12,87 +9,31 @@ import numpy as np
 import numpy.typing as npt
 from pymavlink.dialects.v20 import all as mavlink
 
-from mavlink_bridge.errors import EncodeError
-from mavlink_bridge.frames import FleetFrame, ned_to_enu
-from mavlink_bridge.messages import (
-    BY_TYPE,
-    CommandInt,
-    CommandLong,
-    HilState,
-    Message,
-    SetupSigning,
-    Source,
-    Vector,
-)
+from mavlink_bridge.frames import FleetFrame
+from mavlink_bridge.messages import Message, Source, Vector
 from mavlink_bridge.node import Datagram
-from mavlink_bridge.wire.codec import Codec
-from mavlink_bridge.wire.packing import parcels
 from mavlink_bridge.wire.signing import Signing
-from sitl.autopilot.command_protocol import Orders
-from sitl.autopilot.failures import Failures
-from sitl.autopilot.firmware import Firmware, Mode
-from sitl.autopilot.firmware.ardupilot import ArduPilot
-from sitl.autopilot.firmware.px4 import Px4
-from sitl.autopilot.flight_control import FlightControl
-from sitl.autopilot.home_commands import HomeCommands
-from sitl.autopilot.missions.items import Item
-from sitl.autopilot.missions.service import MissionService
-from sitl.autopilot.navigation import Navigation
-from sitl.autopilot.own_clock import OwnClock
-from sitl.autopilot.parameters import ardupilot as ardupilot_parameters
-from sitl.autopilot.parameters import px4 as px4_parameters
-from sitl.autopilot.parameters.values import Values
-from sitl.autopilot.plant import Plant
-from sitl.autopilot.reception import Reception
-from sitl.autopilot.records import Records
+from sitl.autopilot.aircraft import Aircraft
+from sitl.autopilot.endpoint import Endpoint
+from sitl.autopilot.firmware import Mode
+from sitl.autopilot.parameters.settings import Settings
 from sitl.autopilot.saved import Saved
-from sitl.autopilot.services import Services
-from sitl.autopilot.trust import SigningSetup
+from sitl.autopilot.trust import resumed
 from sitl.camera.camera import Camera
 from sitl.camera.scene import LINK as SIGHT
-from sitl.camera.scene import Scene, truth
+from sitl.camera.scene import Scene
 from sitl.camera.service import CameraService
+from sitl.camera.truth_link import TruthLink
+from sitl.communication import Communication
 from sitl.config.autopilot import AutopilotConfig
 from sitl.environment.weather import WeatherConfig
 from sitl.estimation.sensors import Estimate
-from sitl.snapshot import SnapshotReader
-from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
-from sitl.telemetry.streams import further_rates, usual_rates
-from sitl.values.origin import Origin
-from sitl.vehicle.airframe import hover_speeds
-from sitl.vehicle.battery import Battery
 from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.multirotor import Reference, VehicleState
 
 LINK: Final = "autopilot"
 """Link of all messages; the ground truth that a camera sees comes on the link ``sight``."""
-
-# Message ids; the services add their own.
-_RECEIVED: Final = frozenset(
-    (
-        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
-        mavlink.MAVLINK_MSG_ID_PING,
-        mavlink.MAVLINK_MSG_ID_SET_MODE,
-        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
-        mavlink.MAVLINK_MSG_ID_COMMAND_INT,
-        mavlink.MAVLINK_MSG_ID_COMMAND_LONG,
-        mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
-        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
-        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
-        mavlink.MAVLINK_MSG_ID_TIMESYNC,
-        mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET,
-    )
-)
-_TRUTH: Final[int] = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
-_SHOWN_US: Final = 50_000
-# With more answers than this in a step, telemetry is sent before them.
-_MANY_ANSWERS: Final = 32
-# Limit of messages in answer to one datagram. A datagram that fits an Ethernet frame cannot exceed it: the
-# shortest request takes 13 of 1500 bytes.
-_MAX_ANSWERS: Final = 256
-_TABLES: Final = {"ardupilot": ardupilot_parameters.table, "px4": px4_parameters.table}
-_FIRMWARE: Final[dict[str, type[ArduPilot] | type[Px4]]] = {"ardupilot": ArduPilot, "px4": Px4}
 
 
 class Autopilot:
@@ -124,133 +65,35 @@ class Autopilot:
         see; with it, the vehicle also sends where it truly is on the link ``sight``.
         """
         saved = saved or Saved()
-        self._values = Values(_TABLES[config.flavour](len(vehicle.rotors)), config, saved.parameters)
-        self._configured = config
-        self.config = config = self._values.configured(config)
-        self._source = source = Source(config.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
-        self._outbox: list[Message] = []
-        self._status_text = reporter = StatusReporter(source, self._outbox)
-        self._firmware: Firmware = _FIRMWARE[config.flavour](config)
-        self._origin = Origin(site, config.latitude, config.longitude, config.altitude)
-        self._navigation = navigation = Navigation(config, self._firmware, self._origin, saved)
-        self._plant = plant = Plant(
-            config,
-            vehicle,
-            weather or WeatherConfig(),
-            navigation.guidance,
-            self._origin,
-            self._firmware.coasting,
-            seed,
+        self._settings = settings = Settings(config, len(vehicle.rotors), saved.parameters)
+        config = settings.config
+        source = Source(config.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
+        outbox: list[Message] = []
+        reporter = StatusReporter(source, outbox)
+        self._aircraft = aircraft = Aircraft(
+            config, vehicle, site, seed, weather or WeatherConfig(), saved, reporter
         )
-        self._battery = (
-            None if config.battery is None else Battery(config.battery, hover_speeds(vehicle).tolist())
-        )
-        control = FlightControl(config, self._firmware, navigation, plant.estimate, self._battery, reporter)
-        self._clock = OwnClock(config)
-        self._commander, self._failsafes = control.commander, control.failsafes
-        self._telemetry = Telemetry(usual_rates(config), self._firmware.reports_ekf)
-        self._records = records = Records(
-            source,
-            self._firmware,
-            self._commander,
-            plant,
-            self._origin,
-            navigation.home,
-            self._clock,
-            self._values,
-            self._outbox,
-            reporter,
-            records=config.streams != "quiet",
-        )
-        records.report(self._telemetry)
-        if (further := further_rates(config)) is not None:
-            self._telemetry.stream(*further)
-        self._missions = MissionService(
-            source,
-            navigation.plans,
-            navigation.itinerary,
-            self._commander,
-            self._telemetry,
-            self._outbox,
-            reporter,
-            asks_int=self._firmware.bytewise,
-            home=None if self._firmware.bytewise else self._home_item,
-            guided=None if self._firmware.bytewise else control.maneuvers.go,
-        )
-        self._services = Services(
-            source,
-            self._firmware,
-            self._values,
-            self._telemetry,
-            HomeCommands(
-                navigation.home,
-                self._origin,
-                self._telemetry,
-                plant.estimate,
-                lambda: self._commander.ready,
-                reporter,
-            ),
-            self._missions,
-            Failures(plant, self._battery, lambda: self.config),
-            self._outbox,
-            reporter,
-            self._configure,
-            records.parts,
-        )
-        self._snapshots = SnapshotReader(
-            config,
-            vehicle,
-            source,
-            self._origin,
-            navigation.home,
-            self._firmware,
-            self._commander,
-            navigation.guidance,
-            plant,
-            self._battery,
-            self._missions.current,
-            self._failsafes,
-            self._clock,
-            records.flight,
-        )
-        commands = self._services.commands | control.maneuvers.commands
-        self._reception = Reception(
-            source,
-            self._outbox,
-            reporter,
-            self._commander,
-            Orders(self._commander, self._firmware, commands),
-            control.steering,
-            navigation.following,
-            self._services.handlers,
-            self._firmware.set_mode_ack,
-            self._clock.stamp,
-        )
-        self._signing = signing = _resumed(signing, config, saved)
-        self._trust = SigningSetup(
-            source, signing, config.signing_setup, lambda: self._commander.armed, reporter
-        )
-        self._services.handlers[SetupSigning] = self._trust.set_up
-        received = _RECEIVED | {BY_TYPE[kind].id for kind in self._services.handlers}
-        self._codec = Codec(lambda message_id, _system, _component: message_id in received, signing)
+        self._plant, self._commander = aircraft.plant, aircraft.control.commander
         self.camera: Camera | None = None
-        self._truth_codec = Codec(lambda message_id, _system, _component: message_id == _TRUTH)
-        # Others' cameras see this vehicle.
-        self._shows, self._next_shown = scene is not None, 0
+        service: CameraService | None = None
         if vehicle.camera is not None:
-            self.camera = Camera(vehicle.camera, scene or Scene(), self._origin, site, seed, config.system_id)
-            self._camera_service = CameraService(self.camera)
-        # These values are cached because they are empty or not due in nearly every step.
-        self._reached = navigation.itinerary.reached
-        self._work_due = self._services.next_due
-        # A real ArduCopter sends HEARTBEAT at once after a mode change. Quiet flights do not.
-        self._announces = config.streams != "quiet" and not self._firmware.bytewise
-        self.not_encoded = 0
-        """Number of messages that could not be encoded."""
+            self.camera = Camera(
+                vehicle.camera, scene or Scene(), aircraft.origin, site, seed, config.system_id
+            )
+            service = CameraService(self.camera)
+        # Others' cameras see this vehicle.
+        self._truth_link = TruthLink(source, site, self.camera, shows=scene is not None)
+        signing = resumed(signing, config.signing_setup, saved.signed_until)
+        self._communication = Communication(
+            source, settings, vehicle, aircraft, service, signing, outbox, reporter
+        )
+        self._endpoint = Endpoint(self._communication.received, signing)
         self._boot: int | None = None
-        self._now = 0
-        if config.start_height:
-            self._commander.begin_in_air()
+
+    @property
+    def config(self) -> AutopilotConfig:
+        """Present configuration, with the changes by parameters."""
+        return self._settings.config
 
     @property
     def name(self) -> str:
@@ -266,134 +109,56 @@ class Autopilot:
         """
         if self._boot is None:
             self._boot = now
-            self._clock.boot(now)
-            self._telemetry.start(0)
-        self._now = now - self._boot
-        if self._signing is not None:
-            self._signing.present(self._clock.boot_epoch + self._now)
-        self._plant.move(self._now, armed=self._commander.armed)
-        self._watch()
+            self._aircraft.clock.boot(now)
+        now -= self._boot  # From here on, µs since boot.
+        self._endpoint.present(self._aircraft.clock.boot_epoch + now)
+        self._aircraft.move(now)
+        self._communication.watch(now)
+        self._aircraft.check(now)
         if self.camera is not None:
             self._take_image(self.camera)
         for datagram in inbox:
-            self._receive(datagram)
-        return self._send() + self._show()
-
-    def _watch(self) -> None:
-        was_ready = self._commander.ready
-        self._commander.watch(self._now, self._plant.vehicle.on_ground, self._plant.sensors.gps.located)
-        if self._commander.ready and self._plant.sensors.gps.fixed:
-            self._clock.locate(self._now)
-        if self._commander.ready and not was_ready:
-            self._telemetry.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
-        self._records.watch(self._now)
-        if self._battery is not None and self._battery.due(self._now):
-            self._battery.advance(self._now, self._plant.state.rotor_speeds.tolist())
-        if self._now >= self._failsafes.next_due:
-            self._failsafes.watch(self._now)
+            self._receive(datagram, now)
+        return self._send(now) + self._show(now)
 
     def _take_image(self, camera: Camera) -> None:
         """Let the camera see the truth of the last physics step, once the position is known."""
-        plant, stamp = self._plant, self._clock.stamp
+        plant, stamp = self._plant, self._aircraft.clock.stamp
         if self._commander.ready:
             boot = self._boot or 0
             camera.step(plant.time, boot, plant.state, plant.estimate, stamp(plant.time))
 
-    def _show(self) -> list[Datagram]:
+    def _receive(self, datagram: Datagram, now: int) -> None:
+        if datagram.link == SIGHT:
+            self._truth_link.receive(datagram.data)
+        elif datagram.link == LINK:
+            self._communication.receive(self._endpoint.read(datagram.data), now)
+
+    def _send(self, now: int) -> list[Datagram]:
+        messages = self._communication.send(now)
+        seen = [] if self.camera is None else self.camera.messages(now, self._boot or 0)
+        # What belongs to one image stays in one datagram.
+        return [Datagram(LINK, data) for data in self._endpoint.write(messages, together=seen)]
+
+    def _show(self, now: int) -> list[Datagram]:
         """Return the truth about this vehicle, for the cameras of others, if it is due."""
-        if not self._shows or self._now < self._next_shown:
+        if not self._truth_link.due(now):
             return []
-        self._next_shown = self._now + _SHOWN_US
-        plant = self._plant
-        place, time = ned_to_enu(plant.state.position), plant.time + (self._boot or 0)
-        said = truth(self._source, time, place, self._origin.site)
-        return [Datagram(SIGHT, self._truth_codec.encode(said))]
-
-    def _receive(self, datagram: Datagram) -> None:
-        if datagram.link == SIGHT and self.camera is not None:
-            for sight in self._truth_codec.feed(datagram.data, whole=True):
-                if isinstance(sight, HilState):
-                    self.camera.receive(sight)
-        if datagram.link != LINK:
-            return
-        enough = len(self._outbox) + _MAX_ANSWERS
-        messages = self._codec.feed(datagram.data, whole=True)
-        for number, message in enumerate(messages):
-            if len(self._outbox) >= enough:
-                # Answers go to all receivers: excessive requests of one sender would crowd out the others.
-                left = len(messages) - number
-                self._status_text.complain(f"Requests refused: {left} of one datagram", self._now)
-                break
-            if self.camera is not None and isinstance(message, CommandLong | CommandInt):
-                self._outbox += self._camera_service.handle(message, self._clock.stamp(self._now))
-            mode = self._commander.mode
-            self._reception.handle(message, self._now, self._plant.estimate())
-            if self._announces and self._commander.mode is not mode:
-                self._telemetry.request(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
-        self._trust.watch(self._now)
-        self._work_due = self._services.next_due
-
-    def _send(self) -> list[Datagram]:
-        if self._reached:
-            self._missions.tell()
-        if self._now >= self._work_due:
-            self._services.work(self._now)
-            self._work_due = self._services.next_due
-        messages = self._outbox
-        if self._now >= self._telemetry.next_due:
-            reported = self._telemetry.collect(self._now, self._snapshots.read(self._now))
-            # If there are many answers, the messages sent first are more likely to fit the link.
-            messages = reported + messages if len(messages) > _MANY_ANSWERS else messages + reported
-        seen = [] if self.camera is None else self.camera.messages(self._now, self._boot or 0)
-        if not messages and not seen:
-            return []
-        pieces = [encoded for message in messages if (encoded := self._encoded(message))]
-        if seen:
-            # In one piece: what belongs to one image stays in one datagram.
-            pieces.append(b"".join(map(self._encoded, seen)))
-        data = parcels(pieces)
-        self._outbox.clear()
-        return [Datagram(LINK, parcel) for parcel in data]
-
-    def _encoded(self, message: Message) -> bytes:
-        """Encode a message.
-
-        Return empty bytes if a value does not fit, because such a message must not stop the vehicle.
-        """
-        try:
-            return self._codec.encode(message)
-        except EncodeError:
-            self.not_encoded += 1
-            return b""
-
-    def _home_item(self) -> Item:
-        """Return ArduPilot's item 0: home."""
-        home = self._navigation.home
-        x, y = round(home.latitude * 1e7), round(home.longitude * 1e7)
-        waypoint, frame = mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL
-        return Item(frame, waypoint, 1, (0.0, 0.0, 0.0, 0.0), x, y, home.altitude)
-
-    def _configure(self) -> None:
-        """Apply the parameters that are settings.
-
-        The system id is excepted: it takes effect at the next boot.
-        """
-        changed = self._values.configured(self._configured)
-        self.config = changed.model_copy(update={"system_id": self.config.system_id})
-        for part in (
-            self._firmware,
-            self._navigation.guidance,
-            self._commander,
-            self._navigation.modes,
-            self._snapshots,
-        ):
-            part.configure(self.config)
+        return [self._truth_link.show(now, self.moved_to, self._plant.state.position)]
 
     @property
     def saved(self) -> Saved:
         """Data to keep for the next boot."""
-        until = 0 if self._signing is None else self._signing.newest
-        return Saved(parameters=self._values.changed, plans=self._navigation.plans.all, signed_until=until)
+        return Saved(
+            parameters=self._settings.values.changed,
+            plans=self._aircraft.navigation.plans.all,
+            signed_until=self._endpoint.signed_until,
+        )
+
+    @property
+    def not_encoded(self) -> int:
+        """Number of messages that could not be encoded."""
+        return self._endpoint.not_encoded
 
     # Events and faults, effective from the next step
 
@@ -418,7 +183,7 @@ class Autopilot:
 
     def shift_utc(self, by: int) -> None:
         """Shift the UTC of SYSTEM_TIME by ``by`` (µs) from now on."""
-        self._clock.shift_utc(by)
+        self._aircraft.clock.shift_utc(by)
 
     def shift_gps(self, offset_enu: Vector) -> None:
         """Set the error of GPS positions to ``offset_enu`` (m, fleet-local ENU); zero ends the fault.
@@ -426,7 +191,7 @@ class Autopilot:
         The estimate follows within some seconds, or jumps after rejecting GPS for seven seconds.
         """
         east, north, up = offset_enu
-        self._plant.shift_gps(self._origin.vector_to_local(np.array((north, east, -up))))
+        self._plant.shift_gps(self._aircraft.origin.vector_to_local(np.array((north, east, -up))))
 
     # Ground truth
 
@@ -473,12 +238,13 @@ class Autopilot:
     @property
     def custom_mode(self) -> int:
         """Flight mode as encoded in HEARTBEAT (0)."""
-        return self._firmware.custom_mode(self._commander.mode)
+        return self._aircraft.firmware.custom_mode(self._commander.mode)
 
     @property
     def charge(self) -> float:
         """Remaining battery charge, 0…1; 1 without a battery."""
-        return 1.0 if self._battery is None else self._battery.charge.remaining
+        battery = self._aircraft.battery
+        return 1.0 if battery is None else battery.charge.remaining
 
     @property
     def estimate(self) -> Estimate:
@@ -497,12 +263,3 @@ class Autopilot:
     def reference(self) -> Reference | None:
         """Reference requested now (site NED, for the estimated state), or None if there is none."""
         return self._plant.course.reference
-
-
-def _resumed(signing: Signing | None, config: AutopilotConfig, saved: Saved) -> Signing | None:
-    """Return the signing to use, if any, with timestamps that continue those of an earlier run."""
-    if signing is None and config.signing_setup == "obeyed":
-        signing = Signing()
-    if signing is not None:
-        signing.resume(saved.signed_until)
-    return signing

@@ -8,20 +8,14 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import MissionCurrent, Source, Vector
-from sitl.autopilot.commander import Commander
-from sitl.autopilot.failsafes import Failsafes
-from sitl.autopilot.firmware import Firmware, Mode
-from sitl.autopilot.guidance import Activity, Guidance
-from sitl.autopilot.own_clock import OwnClock
-from sitl.autopilot.plant import Plant
+from sitl.autopilot.aircraft import Aircraft
+from sitl.autopilot.firmware import Mode
+from sitl.autopilot.guidance import Activity
 from sitl.config.autopilot import AutopilotConfig
 from sitl.telemetry.reports import Flight, Snapshot
 from sitl.telemetry.status_reports import version
-from sitl.values.home import Home
-from sitl.values.origin import Origin
 from sitl.values.setpoints import Setpoint
 from sitl.vehicle.airframe import hover_speeds
-from sitl.vehicle.battery import Battery
 from sitl.vehicle.config import VehicleConfig
 from sitl.vehicle.ground import GRAVITY
 
@@ -41,30 +35,22 @@ class SnapshotReader:
         config: AutopilotConfig,
         vehicle: VehicleConfig,
         source: Source,
-        origin: Origin,
-        home: Home,
-        flavour: Firmware,
-        commander: Commander,
-        guidance: Guidance,
-        plant: Plant,
-        battery: Battery | None,
+        aircraft: Aircraft,
         mission: Callable[[], MissionCurrent],
-        failsafes: Failsafes,
-        clock: OwnClock,
         flight: Flight,
     ) -> None:
         self._config = config
         self._source = source
-        self._origin = origin
-        self._home = home
-        self._flavour = flavour
-        self._commander = commander
-        self._guidance = guidance
-        self._plant = plant
-        self._battery = battery
+        self._origin = aircraft.origin
+        self._home = aircraft.navigation.home
+        self._flavour = aircraft.firmware
+        self._commander = aircraft.control.commander
+        self._guidance = aircraft.navigation.guidance
+        self._plant = aircraft.plant
+        self._battery = aircraft.battery
         self._mission = mission
-        self._failsafes = failsafes
-        self._clock = clock
+        self._failsafes = aircraft.control.failsafes
+        self._clock = aircraft.clock
         self._flight = flight
         self._fastest = vehicle.omega_max
         self._version = version(source, config.flavour)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages import (
+    BY_TYPE,
     CommandAck,
     CommandInt,
     CommandLong,
@@ -29,6 +30,23 @@ from sitl.autopilot.following import Following
 from sitl.autopilot.setpoint_reception import SetpointReception
 from sitl.estimation.sensors import Estimate
 from sitl.telemetry.status_text import StatusReporter
+
+# The services add their own.
+_RECEIVED: Final = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_PING,
+        mavlink.MAVLINK_MSG_ID_SET_MODE,
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_COMMAND_INT,
+        mavlink.MAVLINK_MSG_ID_COMMAND_LONG,
+        mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
+        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+        mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
+        mavlink.MAVLINK_MSG_ID_TIMESYNC,
+        mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET,
+    )
+)
 
 
 class Reception:
@@ -68,6 +86,11 @@ class Reception:
         self._set_mode_ack = set_mode_ack
         self._stamp = stamp
         self._autopilots: set[Source] = set()
+
+    @property
+    def received(self) -> frozenset[int]:
+        """Ids of the messages that are handled; others may be dropped before they are decoded."""
+        return _RECEIVED | {BY_TYPE[kind].id for kind in self._services}
 
     def handle(self, message: Message, now: int, estimate: Estimate) -> None:
         """Handle a message that arrived at ``now`` (µs since boot), with the ``estimate`` of that time."""

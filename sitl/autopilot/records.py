@@ -15,10 +15,9 @@ from mavlink_bridge.messages import (
     Message,
     Source,
 )
-from sitl.autopilot.commander import Commander
+from sitl.autopilot.aircraft import Aircraft
 from sitl.autopilot.component_files import GENERAL, ComponentFiles
 from sitl.autopilot.files import FileServer
-from sitl.autopilot.firmware import Firmware
 from sitl.autopilot.firmware.mode_list import standard_mode
 from sitl.autopilot.flight_times import FlightTimes
 from sitl.autopilot.logs.dataflash import DataFlash
@@ -26,15 +25,11 @@ from sitl.autopilot.logs.moment import LoggedParameter, Moment
 from sitl.autopilot.logs.protocol import LogProtocol
 from sitl.autopilot.logs.recorder import Recorder
 from sitl.autopilot.logs.ulog import Ulog
-from sitl.autopilot.own_clock import OwnClock
 from sitl.autopilot.parameters.parameter import Kind
 from sitl.autopilot.parameters.values import Values
-from sitl.autopilot.plant import Plant
 from sitl.telemetry.reports import Snapshot
 from sitl.telemetry.schedule import Telemetry
 from sitl.telemetry.status_text import StatusReporter
-from sitl.values.home import Home
-from sitl.values.origin import Origin
 
 _FOLDERS: Final = {False: "APM/LOGS", True: "fs/microsd/log"}
 
@@ -45,12 +40,7 @@ class Records:
     def __init__(
         self,
         source: Source,
-        firmware: Firmware,
-        commander: Commander,
-        plant: Plant,
-        origin: Origin,
-        home: Home,
-        clock: OwnClock,
+        aircraft: Aircraft,
         values: Values,
         outbox: list[Message],
         reporter: StatusReporter,
@@ -58,10 +48,12 @@ class Records:
         records: bool,
     ) -> None:
         """``records``: whether flights are recorded; without, there are no logs."""
-        self._commander, self._firmware, self._records = commander, firmware, records
-        self._plant, self._origin, self._home, self._clock = plant, origin, home, clock
+        self._commander = commander = aircraft.control.commander
+        self._firmware, self._records = aircraft.firmware, records
+        self._plant, self._origin, self._home = aircraft.plant, aircraft.origin, aircraft.navigation.home
+        self._clock = clock = aircraft.clock
         self._values = values
-        self._px4 = px4 = firmware.bytewise
+        self._px4 = px4 = aircraft.firmware.bytewise
         encoder: type[DataFlash] | type[Ulog] = Ulog if px4 else DataFlash
         self._recorder = Recorder(encoder, self._moment, self._parameters, lambda: clock.epoch)
         self.flight = FlightTimes()

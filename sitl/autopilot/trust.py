@@ -72,3 +72,15 @@ class SigningSetup:
         if refused != self._refused:
             self._refused, self._next = refused, now + _WARNING_INTERVAL_US
             self._status_text.warn(f"Messages do not count: {signing.latest.value}")
+
+
+def resumed(signing: Signing | None, setup: Literal["refused", "obeyed"], until: int) -> Signing | None:
+    """Return the signing to use, if any: without ``signing`` one that ``setup`` may still bring a key to.
+
+    Its timestamps continue those of an earlier run, which ended at ``until`` (10 µs since the start of 2015).
+    """
+    if signing is None and setup == "obeyed":
+        signing = Signing()
+    if signing is not None:
+        signing.resume(until)
+    return signing

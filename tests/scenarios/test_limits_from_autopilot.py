@@ -50,7 +50,7 @@ def ready(flavour, parameters=None, **changes):
 
 def put(vehicle, parameters):
     """Whatever the value: real firmware holds nobody to its ranges."""
-    values = vehicle.autopilot._values
+    values = vehicle.autopilot._settings.values
     for name, value in parameters.items():
         values._values[values.number(name)] = value
 

@@ -40,7 +40,7 @@ def on_a_mission(flavour: str, **more: Any) -> Rig:
     """A second after the takeoff that begins a mission."""
     rig = Rig(flavour, streams="normal", **more)
     client = Client(rig)
-    signing = rig.autopilot._signing
+    signing = rig.autopilot._endpoint.signing
     if signing is not None:
         client.peer.signing.secret_key, client.peer.signing.sign_outgoing = bytes(KEY), True
     client.wait(1.2)
@@ -103,7 +103,7 @@ def test_nothing_of_a_flood_is_kept(kind: str) -> None:
     finally:
         tracemalloc.stop()
     assert grown < GROWTH
-    assert rig.autopilot._outbox == []
+    assert rig.autopilot._communication._outbox == []
 
 
 def test_what_one_datagram_asks_beyond_measure_is_refused_visibly_and_in_nobodys_way() -> None:
@@ -140,7 +140,7 @@ def test_complaints_are_told_of_some_and_not_of_thousands() -> None:
 def test_a_list_comes_to_its_end_however_often_others_begin_one(flavour: str) -> None:
     rig = Rig(flavour)
     numbers: set[int] = set()
-    total = len(rig.autopilot._values)
+    total = len(rig.autopilot._settings.values)
     for sent in flood(rig, crowd(2_000, ("lists of parameters",)), 1.0):
         numbers |= {value.number for value in received(sent, m.ParamValue)}
     assert numbers - {0xFFFF} == set(range(total))
@@ -149,7 +149,7 @@ def test_a_list_comes_to_its_end_however_often_others_begin_one(flavour: str) ->
 def test_who_asks_for_a_list_while_one_goes_out_gets_a_whole_one() -> None:
     rig = Rig("ardupilot")
     ask = Codec().encode(m.ParamRequestList(ME, 11, 1))
-    total = len(rig.autopilot._values)
+    total = len(rig.autopilot._settings.values)
     list(flood(rig, [], 0.005, ask))
     list(flood(rig, [], 0.1))
     values = [value.number for sent in flood(rig, [], 0.005, ask) for value in received(sent, m.ParamValue)]
@@ -204,7 +204,7 @@ def test_nobody_without_the_key_ends_a_flight(flavour: str, how: str) -> None:
     quiet, attacked = (on_a_mission(flavour, signing=Signing(KEY)) for _ in range(2))
     expected = path(quiet, flood(quiet, [], 3.0))
     peer = dialect.MAVLink(None, 255, 190)
-    signing = attacked.autopilot._signing
+    signing = attacked.autopilot._endpoint.signing
     assert signing is not None
     if how == "forged":
         peer.signing.secret_key, peer.signing.sign_outgoing = b"x" * 32, True

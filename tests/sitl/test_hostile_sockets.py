@@ -166,4 +166,4 @@ def test_a_pilot_is_served_whatever_others_do(key: Key | None) -> None:
     np.testing.assert_allclose(rig.autopilot.state.position, [0.0, 0.0, -20.0], atol=0.02)
     assert rig.autopilot.armed
     if mine is not None:
-        assert len(rig.autopilot._signing._streams) == 1  # type: ignore[union-attr]
+        assert len(rig.autopilot._endpoint.signing._streams) == 1  # type: ignore[union-attr]

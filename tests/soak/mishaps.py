@@ -153,7 +153,7 @@ def _move_back(scene: Scene) -> None:
 
 def _tell_origin(scene: Scene) -> None:
     """As autopilots do when it has moved."""
-    scene.craft.autopilot._telemetry.request(49)
+    scene.craft.autopilot._communication.telemetry.request(49)
 
 
 def _take_over(scene: Scene) -> None:

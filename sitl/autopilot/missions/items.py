@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from pymavlink.dialects.v20 import all as mavlink
 
 from mavlink_bridge.messages.fields import on_globe
-from sitl.values.home import ABOVE_HOME, ABOVE_SEA, NOWHERE
+from sitl.values.home import ABOVE_HOME, ABOVE_SEA, NOWHERE, Home
 
 
 class Type(IntEnum):
@@ -88,6 +88,13 @@ class Item(NamedTuple):
     def here(self) -> bool:
         """Whether the item gives no place, and so means the vehicle's position."""
         return self.x == self.y == 0 or NOWHERE in (self.x, self.y)
+
+
+def home_item(home: Home) -> Item:
+    """Return ArduPilot's item 0: home."""
+    x, y = round(home.latitude * 1e7), round(home.longitude * 1e7)
+    waypoint, frame = mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL
+    return Item(frame, waypoint, 1, (0.0, 0.0, 0.0, 0.0), x, y, home.altitude)
 
 
 def fault(item: Item, of: Type) -> int:

@@ -389,7 +389,7 @@ def test_a_stop_outside_guided_stops_nothing():
 
 def test_what_cannot_be_told_is_left_out_and_the_rest_is_told():
     rig = Rig("ardupilot").hover(5.0)
-    rig.autopilot._navigation.home.altitude = -3.0e6
+    rig.autopilot._aircraft.navigation.home.altitude = -3.0e6
     rig.received.clear()
     rig.run(2.0)
     assert rig.all(GlobalPosition) == []
