@@ -6,9 +6,11 @@ from the future; others are counted and dropped.
 
 from __future__ import annotations
 
+from math import sqrt
 from types import MappingProxyType
 from typing import NamedTuple
 
+import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
 from companion.config import CompanionConfig
@@ -16,7 +18,6 @@ from companion.config.target_source import FusedSource
 from companion.estimation.camera_weights import CameraWeights
 from companion.estimation.detections import Detection, detection
 from companion.estimation.fusion import Belief, Fusion
-from companion.estimation.fusion_filter import worst_sigma
 from companion.estimation.fusion_log import Counts, FusionLog, FusionTally
 from companion.estimation.tracks import State
 from companion.values.horizon import Array
@@ -140,7 +141,7 @@ class FusedTarget:
         known = self._known(now)
         if known is None:
             return None
-        age, sigma = now - known.time, worst_sigma(known.covariance)
+        age, sigma = now - known.time, _worst_sigma(known.covariance)
         return State(known.position, known.velocity, age, sigma, known.turn_rate)
 
     def fresh(self, state: State | None) -> State | None:
@@ -197,3 +198,8 @@ class FusedTarget:
         if not east * east + north * north + up * up <= _MAX_DISTANCE_M**2:
             return None
         return detection(source, system, time, place, camera, message)
+
+
+def _worst_sigma(P: Array) -> float:
+    """Return σ along the worst axis of a covariance ``P`` (3, 3)."""
+    return sqrt(max(float(np.linalg.eigvalsh(P)[-1]), 0.0))

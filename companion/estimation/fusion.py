@@ -16,11 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.config.target_source import FusedSource, OwnErrors
+from companion.estimation.acceleration_adaptation import AGREE_M, AGREE_M_S
 from companion.estimation.detections import Detection
 from companion.estimation.fusion_filter import (
     ADAPTED,
-    AGREE_M,
-    AGREE_M_S,
     FIELDS,
     GROUPS,
     MARKS,

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from companion.config.target_source import FusedSource, OwnErrors
 from companion.estimation.detections import Detection, detection
-from companion.estimation.fusion_filter import WHITE_SHARE
+from companion.estimation.fusion_motion import WHITE_SHARE
 from mavlink_bridge.frames import FleetFrame
 from mavlink_bridge.messages import CameraTrackingGeo, Source
 from outrider.scenarios.companion_settings import own_errors
