@@ -63,7 +63,9 @@ class Flown:
             if kept in self.kept:
                 continue
             self.kept.add(kept)
-            true = one.plans.get(agreement.own), self.vehicles[system - 1].plans.get(agreement.other)
+            # Of the epochs of a step that lasted nothing was noted: the plan before was carried on.
+            own = one.plans.get(agreement.own) or one.plan(agreement.own)
+            true = own, self.vehicles[system - 1].plans.get(agreement.other)
             if (plans.own.plan, plans.other.plan) != true:
                 self.mistaken.append(kept)
 

@@ -28,6 +28,7 @@ FLIGHTS = settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow]
 @FLIGHTS
 @given(st.integers(0, 2**16), losses, delays)
 @example(597, 0.0, 500_000)  # lands in the step after it has left the column of its take-off
+@example(34275, 0.0, 500_000)  # carries a column on in a step that lasts, and then proposes it
 def test_a_column_is_kept_whatever_happens(seed: int, loss: float, delay: int) -> None:
     """From the climb's beginning to its end, and from the landing's on, all plans are apart horizontally."""
     assert not at_random(seed, Rough(loss, delay, 0.2)).faults()

@@ -76,13 +76,13 @@ def test_what_is_recalled_never_was() -> None:
     """A plan is filed, an offer taken that replaces an agreement, and another one proposed."""
     two = agreed()
     mine, peer = two.first, two.first.peers.counted[OTHER]
-    before = peer.pair.kept, peer.pair.considered, dict(peer.agreed), mine._plans.newest
+    before = peer.pair.kept, peer.pair.considered, dict(peer.agreed), mine.plans.newest
     mine.made(plan(1))
     peer.agree(Agreement(epoch(0), epoch(1)), before[2][before[0][-1]])
     peer.propose(NOW, Agreement(epoch(1), epoch(1)), before[2][before[0][-1]])
     assert peer.pair.kept != before[0]
     assert mine.recall(epoch(1))
-    assert (peer.pair.kept, peer.pair.considered, peer.agreed, mine._plans.newest) == before
+    assert (peer.pair.kept, peer.pair.considered, peer.agreed, mine.plans.newest) == before
     assert peer.changed
     assert peer.waiting(NOW) is None
     assert not mine.recall(epoch(1))
