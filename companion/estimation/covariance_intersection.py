@@ -53,9 +53,10 @@ def intersect(P: Array, R: Array, B: Array, S: Array) -> bool:
     for j in range(n):
         for k in range(n):
             P[j, k] /= share
-    for a in range(3):
-        for j in range(n):
+    for j in range(n):
+        for a in range(3):
             B[j, a] /= share
+    for a in range(3):
         for b in range(3):
             S[a, b] = B[a, b] + R[a, b] / (1.0 - share)
     return True
