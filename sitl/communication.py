@@ -100,7 +100,8 @@ class Communication:
         self._snapshots = SnapshotReader(
             config, vehicle, source, aircraft, self._missions.current, self._records.flight
         )
-        settings.parts += (aircraft, self._snapshots)
+        settings.add(aircraft)
+        settings.add(self._snapshots)
         self._signing_setup = SigningSetup(
             source, signing, config.signing_setup, lambda: self._commander.armed, reporter
         )

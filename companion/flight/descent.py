@@ -7,8 +7,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.config import CompanionConfig
 from companion.estimation.tracks import State
 from companion.flight.command_protocol import Commands
-from companion.flight.control_authority import Passage
 from companion.flight.landing import Landing, landed
+from companion.flight.passage import Passage
 from companion.flight.vehicle import Vehicle
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Message

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from companion.estimation.tracks import State
 from companion.flight.autopilots import Profile, Step
 from companion.flight.command_protocol import Commands
-from companion.flight.control_authority import Passage
+from companion.flight.passage import Passage
 from companion.flight.vehicle import Vehicle
 from companion.values.horizon import Array
 from mavlink_bridge.messages import Message

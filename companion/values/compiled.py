@@ -2,17 +2,16 @@
 
 A kernel is compiled for fixed argument types when its module is imported, and its machine code is kept on
 disk, so nothing is compiled in flight. A part is inlined into the kernels that call it. Numba compiles a
-stored kernel again only if the kernel's own file has changed; here it does so too if another file has changed
-from which a kernel, or a part of it, imports parts by their names. A constant has to be in the file of the
-kernel or part that uses it.
+stored kernel again if the kernel's own file has changed; here it does so too if parts or constants have
+changed that come from other files, which must be imported by their names. A kernel calls no other kernel.
 """
 
 from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from types import CodeType
 from typing import Any, TypeVar, cast
 
 import numba
@@ -65,16 +64,22 @@ def kernel(result: Any, *arguments: Any) -> Callable[[_F], _F]:
 
     An argument of another type is a TypeError. The machine code is stored if numba finds a directory for it.
     A read-only system without a home directory has none, and compiles at each start. Stored code that cannot
-    be read, as after a loss of power, is replaced; where there is no room for it, it is not stored.
+    be read, as after a loss of power, is replaced; where there is no room for it, it is not stored. Raises
+    TypeError for a kernel that calls another one.
     """
     signature = result(*arguments)
 
     def compiled(function: _F) -> _F:
+        used = _digest(function)
+
         def compile_(*, stored: bool) -> Any:
             found = cast(Any, numba.njit(error_model="numpy")(function))
             if stored:
                 found.enable_caching()
-                _watch_other_files(found)
+                # Numba would put variables of a closure into the key, which a decorator cannot add. Without
+                # this attribute of numba's own the kernel is not stored.
+                store = found._cache._cache_file
+                store._source_stamp = store._source_stamp, used
             found.compile(signature)
             found.disable_compile()
             return found
@@ -95,33 +100,43 @@ def kernel(result: Any, *arguments: Any) -> Callable[[_F], _F]:
     return compiled
 
 
-def _watch_other_files(kernel: Any) -> None:
-    """Add a digest of the other files that parts of a kernel come from to the stamp of its stored code.
+def _digest(kernel: Any) -> bytes:
+    """Return a digest of the parts of a ``kernel`` from other files, and of all constants.
 
-    Numba offers no other way to compile it again after a change of these.
+    It is that of the bytecode, because an installation may lack the sources.
     """
-    files, found, seen = set[str](), [kernel.py_func], set[Any]()
+    digest, found, seen = hashlib.sha256(), [kernel], set[Any]()
     while found:
         function = found.pop()
         seen.add(function)
-        files.add(function.__code__.co_filename)
-        used = (function.__globals__.get(name) for name in function.__code__.co_names)
-        found += [one.py_func for one in used if isinstance(one, Dispatcher) and one.py_func not in seen]
-    files.remove(kernel.py_func.__code__.co_filename)
-    if not files:
-        return
-    digest = hashlib.sha256()
-    for file in sorted(files):
-        digest.update(Path(file).read_bytes())
-    store = kernel._cache._cache_file
-    store._source_stamp = store._source_stamp, digest.digest()
+        elsewhere = function.__code__.co_filename != kernel.__code__.co_filename
+        for code in _codes(function.__code__):
+            if elsewhere:
+                constants = [one for one in code.co_consts if not isinstance(one, CodeType)]
+                digest.update(repr((code.co_code, code.co_names, code.co_varnames, constants)).encode())
+            for name in code.co_names:
+                used = function.__globals__.get(name)
+                if isinstance(used, int | float | tuple):
+                    digest.update(f"{name}={used!r};".encode())
+                elif isinstance(used, Dispatcher):
+                    if not used.targetoptions.get("forceinline"):
+                        raise TypeError(f"{kernel.__name__} calls {name}, which is a kernel and no part")
+                    found += [used.py_func] if used.py_func not in seen else []
+    return digest.digest()
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """Yield ``code`` and the code of functions and comprehensions within it."""
+    yield code
+    for inner in code.co_consts:
+        if isinstance(inner, CodeType):
+            yield from _codes(inner)
 
 
 def _free_intermediate_code(loaded: Any) -> None:
     """Free LLVM's intermediate code of a loaded kernel, a tenth of a companion's memory at its start.
 
-    Numba keeps it to compile it into other kernels. The kernels of a file are compiled together, and none
-    calls a kernel of another file, so a loaded one is not needed for that.
+    Numba keeps it to compile it into other kernels, which none is: a kernel calls parts only.
     """
     for result in loaded.overloads.values():
         module = getattr(result.library, "_shared_module", None)

@@ -23,15 +23,19 @@ class Configurable(Protocol):
 class Settings:
     """Present ``config``, and the ``values`` of the parameters that change it.
 
-    ``parts`` are told of a change, in their order.
+    Its parts are told of a change, in the order in which they were added.
     """
 
     def __init__(self, config: AutopilotConfig, rotors: int, saved: Mapping[str, float]) -> None:
         """Apply the ``saved`` values to ``config``; ``rotors``: their number, which the table depends on."""
         self.values = Values(_TABLES[config.flavour](rotors), config, saved)
         self.config = self.values.configured(config)
-        self.parts: list[Configurable] = []
+        self._parts: list[Configurable] = []
         self._initial = config
+
+    def add(self, part: Configurable) -> None:
+        """Tell ``part`` of changes from now on."""
+        self._parts.append(part)
 
     def apply(self) -> None:
         """Apply the parameters that are settings.
@@ -40,5 +44,5 @@ class Settings:
         """
         changed = self.values.configured(self._initial)
         self.config = changed.model_copy(update={"system_id": self.config.system_id})
-        for part in self.parts:
+        for part in self._parts:
             part.configure(self.config)

@@ -42,12 +42,22 @@ def doubled(x):
 """
 FACTOR = """
 from companion.values.compiled import part
+from number import NUMBER
 
 
 @part
 def times(x):
-    return 2.0 * x
+    return NUMBER * x
 """
+CALLING = (
+    MODULE
+    + """
+
+@kernel(FLOAT, FLOAT)
+def four_times(x):
+    return twice(twice(x))
+"""
+)
 READ_ONLY = """
 import tempfile
 
@@ -83,14 +93,26 @@ def test_the_second_start_loads(tmp_path: Path) -> None:
     assert start(tmp_path) == ["twice 8.0 loaded"]
 
 
-def test_a_part_of_a_part_that_changes_in_another_file_is_compiled_again(tmp_path: Path) -> None:
-    (tmp_path / "doubled.py").write_text(DOUBLED)
-    (tmp_path / "factor.py").write_text(FACTOR)
+@pytest.mark.parametrize(
+    ("file", "old", "new"), [("factor", "NUMBER * x", "NUMBER * x + 4.0"), ("number", "2.0", "3.0")]
+)
+def test_a_part_of_a_part_or_a_constant_that_changes_in_another_file_is_compiled_again(
+    file: str, old: str, new: str, tmp_path: Path
+) -> None:
+    for name, text in (("doubled", DOUBLED), ("factor", FACTOR), ("number", "NUMBER = 2.0")):
+        (tmp_path / f"{name}.py").write_text(text)
     assert start(tmp_path, module=WITH_PARTS) == ["twice 8.0 compiled"]
     assert start(tmp_path, module=WITH_PARTS) == ["twice 8.0 loaded"]
-    (tmp_path / "factor.py").write_text(FACTOR.replace("2.0", "3.00"))
+    changed = tmp_path / f"{file}.py"
+    changed.write_text(changed.read_text().replace(old, new))
     assert start(tmp_path, module=WITH_PARTS) == ["twice 12.0 compiled"]
     assert start(tmp_path, module=WITH_PARTS) == ["twice 12.0 loaded"]
+
+
+def test_a_kernel_that_calls_another_one_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(subprocess.CalledProcessError) as refused:
+        start(tmp_path, module=CALLING)
+    assert "TypeError: four_times calls twice, which is a kernel and no part" in refused.value.stderr
 
 
 @pytest.mark.slow

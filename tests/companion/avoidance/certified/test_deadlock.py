@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ GOAL = np.array([8.0, 0.0, 5.0])
 REST = np.array([0.0, 0.0, 5.0])
 BACK = (-1e3, 0.0, 0.0)
 AHEAD, RIGHT = np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
+NOBODY = Pushes(np.empty((0, 3)), np.empty((0, 3)))
 
 
 def turned(*velocities: np.ndarray, sense: float = 1.0) -> float:
@@ -42,9 +45,8 @@ def test_the_others_that_push_count_all_the_same() -> None:
 def stands(step: np.ndarray, *, goal: np.ndarray = GOAL, moving: bool = False, seconds: float = 3.0) -> bool:
     """Whether a plan whose end moves by ``step`` in each second stands after some seconds."""
     turn = DeadlockTurn(DeadlockConfig())
-    nobody = Pushes(np.empty((0, 3)), np.empty((0, 3)))
     for k in range(round(5 * seconds) + 1):
-        turn.learn(REST + 0.2 * k * step, goal, nobody, 1.0, 0.2, moving=moving)
+        turn.learn(REST + 0.2 * k * step, goal, NOBODY, 1.0, 0.2, moving=moving)
     return turn.stands
 
 
@@ -61,19 +63,55 @@ def test_a_plan_stands_whose_end_stays_about_one_place_that_is_not_the_goal() ->
     assert not stands(still, moving=True)
 
 
-def test_a_second_goal_is_measured_from_where_it_was_given_and_one_that_hardly_moves_is_the_same() -> None:
+def test_a_second_goal_is_measured_from_where_it_was_given() -> None:
     """A vehicle that has been at its first goal was never nearer to the second one than to that."""
-    turn, nobody = DeadlockTurn(DeadlockConfig()), Pushes(np.empty((0, 3)), np.empty((0, 3)))
-    rest = REST
+    turn, rest = DeadlockTurn(DeadlockConfig()), REST
     for goal in (REST, GOAL):
         for _ in range(25):
             turn.measure_to(goal)
             rest = rest + 0.05 * (goal - rest)
-            turn.learn(rest, goal, nobody, 1.0, 0.2)
+            turn.learn(rest, goal, NOBODY, 1.0, 0.2)
             assert not turn.overtime
-    for k in range(25):
-        turn.measure_to(GOAL + 0.01 * k * AHEAD)
-        turn.learn(rest, GOAL, nobody, 1.0, 0.2)
+
+
+def stalled(goals: Sequence[Array | None], pushes: Pushes = NOBODY) -> DeadlockTurn:
+    """The turn of a vehicle that stays for 8 s while it gets these goals in turn; None: on a surface."""
+    turn = DeadlockTurn(DeadlockConfig())
+    for k in range(40):
+        goal = goals[k % len(goals)]
+        turn.measure_to(goal)
+        turn.learn(REST, GOAL if goal is None else goal, pushes, 1.0, 0.2)
+    return turn
+
+
+def test_who_is_stalled_is_not_on_the_way_to_another_goal() -> None:
+    turn = stalled([GOAL], Pushes(np.array([BACK]), np.zeros((1, 3))))
+    assert turn.stalled
+    assert turn.angle > 3.0
+    turn.measure_to(GOAL + 2.0 * RIGHT)
+    assert not turn.overtime
+    assert turn.angle == 0.0
+
+
+def test_after_a_surface_the_same_destination_is_another_one() -> None:
+    turn = stalled([GOAL])
+    turn.measure_to(None)
+    turn.measure_to(GOAL)
+    assert not turn.overtime
+
+
+@pytest.mark.parametrize("second", [GOAL + 3.0 * RIGHT, GOAL - 3.0 * AHEAD])
+def test_goals_in_turn_are_no_progress(second: Array) -> None:
+    assert stalled([GOAL, second]).stalled
+
+
+def test_a_destination_that_slides_with_a_vehicle_is_no_progress() -> None:
+    """With a speed limit it stays 4 m ahead, on a circle that leads nowhere."""
+    turn = DeadlockTurn(DeadlockConfig())
+    for k in range(40):
+        place = REST + 3.0 * np.array([np.cos(0.1 * k), np.sin(0.1 * k), 0.0])
+        turn.measure_to(place + 4.0 * AHEAD)
+        turn.learn(place, place + 4.0 * AHEAD, NOBODY, 1.0, 0.2)
     assert turn.stalled
 
 
