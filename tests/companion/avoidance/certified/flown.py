@@ -63,9 +63,7 @@ class Flown:
             if kept in self.kept:
                 continue
             self.kept.add(kept)
-            # Of the epochs of a step that lasted nothing was noted: the plan before was carried on.
-            own = one.plans.get(agreement.own) or one.plan(agreement.own)
-            true = own, self.vehicles[system - 1].plans.get(agreement.other)
+            true = one.held(agreement.own), self.vehicles[system - 1].held(agreement.other)
             if (plans.own.plan, plans.other.plan) != true:
                 self.mistaken.append(kept)
 

@@ -62,6 +62,8 @@ class Vehicle:
         """Whether it kept planes that are not upright when its autopilot began to decide on its height."""
         self.busy_until = 0
         """Until when (µs of the run) its last step lasts."""
+        self.long: list[tuple[int, int]] = []
+        """From when till when (µs of the run) a step lasted that sent nothing."""
         self.stalled: list[tuple[int, int, WirePlan]] = []
         """From when till when (µs of the run) a step lasted that sent nothing, and its newest plan until
         then, which a backup node flies meanwhile."""
@@ -109,9 +111,21 @@ class Vehicle:
     def recall(self, since: int) -> bool:
         """Recall the step that began at ``since`` (µs of the run), see ``CertifiedFlight``."""
         recalled = self.flight.recall()
+        if recalled:
+            self.long.append((since, self.busy_until))
         if recalled and self.plans:
             self.stalled.append((since, self.busy_until, self.plans[max(self.plans)]))
         return recalled
+
+    def held(self, epoch: int) -> WirePlan | None:
+        """The plan of ``epoch`` (µs) that it told or flew; None: none.
+
+        In a step that lasted and sent nothing it carried the plan before on, which it may tell later.
+        """
+        since = epoch - EPOCH - self.habits.ahead
+        if epoch not in self.plans and any(begin < since <= end for begin, end in self.long):
+            return self.plans.setdefault(epoch, self.plan(epoch))
+        return self.plans.get(epoch)
 
     def note(self, sent: Sequence[Tunnel]) -> None:
         """Record what it flies after a step that ``sent`` these messages, and the plans among them."""
