@@ -59,7 +59,7 @@ def test_a_plan_is_kept_whose_companion_is_silent(
     assert flown.summary["converged"] is not ended
     # The others hear that the plan is the last, and fly past its end to their goals.
     others = [c for c in flight.companions if c.name != "companion-12"]
-    assert [12 in agreements(c).left for c in others] == [ended] * 2
+    assert [12 in agreements(c).peers.left for c in others] == [ended] * 2
     assert flown.summary["others_converge_s"] is not None
 
 
