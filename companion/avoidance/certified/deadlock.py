@@ -36,8 +36,6 @@ _MIN_PULL_DISTANCE_M = 0.5
 _MIN_GAIN_M = 0.05
 _REACHED_M = 0.1
 """Progress: the rest point is nearer to the goal than ``_REACHED_M``, or ``_MIN_GAIN_M`` nearer than ever."""
-_ANOTHER_M = 0.5
-"""Distance by which a destination at rest must move from one plan to the next to be another one."""
 _STANDS_S, _STANDS_M = 1.0, 0.25
 """Time (s) for which the rest point stays within a distance (m) of one place before the plan stands."""
 _IN_VAIN_S = 5.0
@@ -64,9 +62,6 @@ class DeadlockTurn:
         self._config, self._sense = config, sense
         self.angle = 0.0
         """Angle (rad) by which the goal is turned now, to the side of ``sense``."""
-        self._destination: Array | None = None
-        self._another, self._stayed = False, 0.0
-        """Whether the distance is to be measured anew; for how long (s) the destination has been the same."""
         self._distance: float | None = None
         self._best = np.inf
         self._waited = 0.0
@@ -110,25 +105,6 @@ class DeadlockTurn:
         config = self._config
         return config.patience + (config.bend_more - config.bend) / config.slow
 
-    def measure_to(self, destination: Array | None) -> None:
-        """Measure progress to ``destination`` (3,), m, at rest; None: to one that moves, or on a surface.
-
-        With another destination everything begins anew, if the one before was reached, or was the same for
-        so long that the turn could have been full. Otherwise a vehicle that has reached a goal would make no
-        progress to the next one, because it was never nearer to that than to the first. A destination that
-        changes sooner is no progress by itself; only the distance is measured anew. One that slides with the
-        vehicle, as that of a speed limit does, is the same.
-        """
-        last, self._destination = self._destination, destination
-        if destination is None or (last is not None and np.abs(destination - last).max() <= _ANOTHER_M):
-            return
-        if last is None or self._best < _REACHED_M or self._stayed > self._full_after:
-            self.angle = self._waited = 0.0
-            self.restart()
-        else:
-            self._another = True
-        self._stayed = 0.0
-
     def give_up(self) -> None:
         """End the turn and measure progress anew, if there was none for ``_IN_VAIN_S`` after it was full.
 
@@ -140,7 +116,7 @@ class DeadlockTurn:
             self.restart()
 
     def restart(self) -> None:
-        """Measure progress anew, because the goal or the way to it is another one."""
+        """Measure progress anew, because the way to the goal is another one."""
         self._distance, self._best = None, np.inf
         self._stood_at, self._stood = None, 0.0
 
@@ -168,9 +144,6 @@ class DeadlockTurn:
         distance = direct + beyond
         approach_speed = np.inf if self._distance is None else (self._distance - distance) / seconds
         self._distance = distance
-        self._stayed += seconds
-        if self._another:
-            self._another, self._best = False, distance
         if moving:
             self._best, self._waited = np.inf, 0.0
         elif distance < self._best - _MIN_GAIN_M or distance < _REACHED_M:

@@ -339,8 +339,6 @@ class CertifiedFlight:
         destination = self._places.destination(now, epoch, own[-1, 2], aim, self.agreements.peers)
         given = aim.given and destination is aim.destination
         moving = aim.path is not None
-        at_rest = aim.surface is None and not moving
-        self._deadlock_turn.measure_to(aim.destination if at_rest else None)
         subgoal, goal = self._goals.chosen(now, epoch, start, own, destination, given=given, moving=moving)
         others, field = self._sources.around(now, epoch, own, goal, self.agreements, world, view)
         objective = self._objective(1e-6 * (start.epoch - now), aim, goal, field)
