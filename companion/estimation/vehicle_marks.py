@@ -1,8 +1,8 @@
-"""What the fusion filter remembers of each vehicle, as parts of the filter.
+"""Marks of the vehicles that send detections, as parts of the fusion filter.
 
-Its marks are the mean d² of its detections (0 before the first), the seconds since the last one, and the
-place (3) and the velocity (3) of its camera then, m, m/s. A vehicle states where it was a little earlier; the
-velocity says how far it has moved on since. The mean d² says whether its detections are too often wrong.
+Those of a vehicle are the mean d² of its detections (0 before the first), the seconds since the last one, and
+the place (3) and the velocity (3) of its camera then, m, m/s. A vehicle states where it was a little earlier;
+the velocity says how far it has moved on since. The mean d² says whether its detections are too often wrong.
 """
 
 from __future__ import annotations

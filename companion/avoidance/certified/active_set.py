@@ -23,6 +23,7 @@ from companion.avoidance.certified.numbered_constraints import (
     write_factors,
 )
 from companion.values.compiled import FLOAT, INT, array, kernel, output, part
+from companion.values.dot_product import dot
 from companion.values.horizon import Array
 
 _TOLERANCE = 1e-9
@@ -58,11 +59,6 @@ def _finite(a: Array) -> bool:
         for i in range(a.shape[1]):
             total += a[axis, i]
     return bool(np.isfinite(total))
-
-
-@part
-def _dot(a: Array, b: Array) -> float:
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 class Effects(NamedTuple):
@@ -161,7 +157,7 @@ def active_set(
                 image[axis, i] = factors[axis] * images_of[y, i]
         short = violation + _along(results_of[y], factors, start) - _along(results_of[y], factors, x)
         for k in range(count + 1):
-            product = products[y_of[k], y] * _dot(c_of[k], factors)
+            product = products[y_of[k], y] * dot(c_of[k], factors)
             gram[count, k] = gram[k, count] = product
         multiplier = 0.0
         while True:

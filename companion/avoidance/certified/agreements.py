@@ -177,9 +177,9 @@ class Agreements:
         newest = self.plans.newest
         if newest is None or newest.plan.epoch < self.since or self._farewell is not None:
             return
-        for peer in self.peers.counted.values():
+        for _, peer in self.peers.present():
             settled = peer.settled is newest and now <= peer.settled_until
-            if settled or peer.left is not None or peer.doubted(now):
+            if settled or peer.doubted(now):
                 continue
             if peer.stated and peer.plans.newest is not None:
                 self.negotiation.advance(now, peer, newest, self.since)
@@ -191,7 +191,7 @@ class Agreements:
 
     def kept(self) -> dict[int, tuple[Agreement, ...]]:
         """Return the agreements that the own plans keep, by system id, without those of departed vehicles."""
-        return {system: peer.pair.kept for system, peer in self.peers.counted.items() if peer.left is None}
+        return {system: peer.pair.kept for system, peer in self.peers.present()}
 
     def age(self, now: int, systems: Iterable[int]) -> float:
         """Return the mean age (s), at ``now`` (µs), of the plans on which room beside ``systems`` rests.
@@ -236,9 +236,7 @@ class Agreements:
 
         A peer needs the plan to take the proposal, and may not have received it.
         """
-        epochs = {
-            one.own for peer in self.peers.counted.values() if peer.left is None for one in peer.pair.open
-        }
+        epochs = {one.own for _, peer in self.peers.present() for one in peer.pair.open}
         found = [self.plans.get(epoch) for epoch in sorted(epochs)]
         return [one.plan for one in found if one is not None and one is not self.plans.newest]
 

@@ -25,6 +25,7 @@ import numpy as np
 
 from companion.values.boxes import Boxes
 from companion.values.compiled import BOOL, FLOAT, VOID, array, kernel, output, part
+from companion.values.dot_product import dot
 from companion.values.horizon import Array
 
 _TINY = 1e-12
@@ -44,20 +45,15 @@ def box_planes(
 
 
 @part
-def _dot(a: Array, b: Array) -> float:
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-@part
 def _try(c: Array, triangle: Array, half: Array, upright: bool, best: Array, furthest: float) -> float:
     """Compare the direction ``c`` (3,), of any length, with the ``best`` so far; return the larger room."""
     if upright:
         c[2] = 0.0
-    norm = sqrt(_dot(c, c))
+    norm = sqrt(dot(c, c))
     if not norm >= _TINY:
         return furthest
     c /= norm
-    room = min(_dot(c, triangle[0]), _dot(c, triangle[1]), _dot(c, triangle[2]))
+    room = min(dot(c, triangle[0]), dot(c, triangle[1]), dot(c, triangle[2]))
     room -= abs(c[0]) * half[0] + abs(c[1]) * half[1] + abs(c[2]) * half[2]
     if room <= furthest:
         return furthest
@@ -72,7 +68,7 @@ def _best(triangle: Array, half: Array, upright: bool, c: Array, best: Array) ->
     for i in range(3):
         for k in range(3):
             c[k] = triangle[i, k] - min(max(triangle[i, k], -half[k]), half[k])
-        near = min(near, sqrt(_dot(c, c)))
+        near = min(near, sqrt(dot(c, c)))
         furthest = _try(c, triangle, half, upright, best, furthest)
     # No direction shows more than the distance of a vertex.
     if furthest >= near - _TINY and near > 0.0:
@@ -145,10 +141,10 @@ def _box_planes(
             normal[1] = sin * best[0] + cos * best[1]
             normal[2] = best[2]
             # The support in the frame of the plan, of the normal as it is rounded there.
-            support = _dot(normal, centres[m])
+            support = dot(normal, centres[m])
             support += abs(cos * normal[0] + sin * normal[1]) * half[0]
             support += abs(cos * normal[1] - sin * normal[0]) * half[1] + abs(normal[2]) * half[2]
             for i in range(3):
-                here = _dot(normal, committed[n, i])
+                here = dot(normal, committed[n, i])
                 least[m, n, i] = min(here, support + distance)
                 wanted[m, n, i] = min(here, support + distance + spare)

@@ -9,7 +9,7 @@ from mavlink_bridge.wire.plan import WirePlan
 
 
 class ColumnAgreements:
-    """What the ``agreements`` of a vehicle say of its column, a plan of which the heights do not count."""
+    """Those of a vehicle's ``agreements`` that are on its column, a plan whose heights do not count."""
 
     def __init__(self, agreements: Agreements) -> None:
         self._agreements, self._peers = agreements, agreements.peers
@@ -31,8 +31,8 @@ class ColumnAgreements:
         """Return the vehicles with which an agreement is kept that is not on an own column."""
         return {
             system
-            for system, peer in self._peers.counted.items()
-            if peer.left is None and not all(self._on_column(one) for one in peer.pair.kept)
+            for system, peer in self._peers.present()
+            if not all(self._on_column(one) for one in peer.pair.kept)
         }
 
     def _on_column(self, one: Agreement) -> bool:

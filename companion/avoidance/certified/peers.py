@@ -54,6 +54,10 @@ class Peers:
         yield from self.counted.values()
         yield from self._distant.values()
 
+    def present(self) -> Iterator[tuple[int, Peer]]:
+        """Yield the peers that count and have not said farewell, each with its system id."""
+        return ((system, peer) for system, peer in self.counted.items() if peer.left is None)
+
     def place(self, now: int, peer: Peer) -> None:
         """Count a ``peer`` that was heard at ``now`` (µs), unless its plan shows that it is beyond the range.
 
@@ -118,21 +122,21 @@ class Peers:
     @property
     def away(self) -> frozenset[int]:
         """Members whose vehicle another controller flies, which need not keep the agreements."""
-        return frozenset([system for system, peer in self.counted.items() if peer.away and peer.left is None])
+        return frozenset([system for system, peer in self.present() if peer.away])
 
     @property
     def outside(self) -> float:
         """Largest distance (m) by which a member has left its tube, by its newest statement."""
-        return max((peer.outside for peer in self.counted.values() if peer.left is None), default=0.0)
+        return max((peer.outside for _, peer in self.present()), default=0.0)
 
     def lately(self, now: int, within: int) -> Iterator[Peer]:
         """Yield the peers of which a plan or statement was received ``within`` this time (µs) before ``now``.
 
         Departed ones and those that another controller flies are not among them.
         """
-        for peer in self.counted.values():
+        for _, peer in self.present():
             last = peer.last_received
-            if peer.left is None and not peer.away and last is not None and now - last <= within:
+            if not peer.away and last is not None and now - last <= within:
                 yield peer
 
     def received(self, now: int, count: int) -> float | None:
@@ -148,7 +152,7 @@ class Peers:
 
     def newest(self) -> dict[int, StoredPlan]:
         """Return the newest plan of each peer that has not said farewell, in the order of the peers."""
-        known = ((s, peer.plans.newest) for s, peer in self.counted.items() if peer.left is None)
+        known = ((system, peer.plans.newest) for system, peer in self.present())
         return {system: plan for system, plan in known if plan is not None}
 
     def ends(self) -> dict[int, Array]:

@@ -32,6 +32,7 @@ import numpy as np
 from companion.avoidance.certified.box_planes import box_planes
 from companion.values.boxes import Boxes
 from companion.values.compiled import BOOL, FLOAT, VOID, array, kernel, output, part
+from companion.values.dot_product import dot
 from companion.values.horizon import Array
 
 _TINY = 1e-12
@@ -163,11 +164,6 @@ def hull_distance(triangles: Array) -> Array:
 
 
 @part
-def _dot(a: Array, b: Array) -> float:
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-@part
 def _nearest(triangle: Array, candidate: Array, best: Array) -> None:
     """Write ``nearest`` of one ``triangle`` (3, 3) to ``best`` (3,); ``candidate`` (3,) is scratch memory.
 
@@ -193,14 +189,14 @@ def _nearest(triangle: Array, candidate: Array, best: Array) -> None:
                 candidate[i] = (end[j] - start[j]) * (after[k] - end[k]) - (end[k] - start[k]) * (
                     after[j] - end[j]
                 )
-            if _dot(candidate, start) < 0.0:
+            if dot(candidate, start) < 0.0:
                 for i in range(3):
                     candidate[i] = -candidate[i]
-        norm = sqrt(_dot(candidate, candidate))
+        norm = sqrt(dot(candidate, candidate))
         # Loops, because an operation on arrays of three takes several times as long.
         for i in range(3):
             candidate[i] /= norm if norm >= _TINY else np.inf
-        margin = min(_dot(candidate, triangle[0]), _dot(candidate, triangle[1]), _dot(candidate, triangle[2]))
+        margin = min(dot(candidate, triangle[0]), dot(candidate, triangle[1]), dot(candidate, triangle[2]))
         if margin > furthest:
             furthest = margin
             for i in range(3):
@@ -236,7 +232,7 @@ def _gaps(
             relative[i, 2] = 0.0
     _nearest(relative, candidate, c)
     for i in range(3):
-        gaps[i] = _dot(c, relative[i])
+        gaps[i] = dot(c, relative[i])
     c[2] *= height
 
 
@@ -247,7 +243,7 @@ def _travel(plan: Array, upright: bool, travel: Array) -> float:
         travel[k] = plan[len(plan) - 1, 2, k] - plan[0, 0, k]
     if upright:
         travel[2] = 0.0
-    return sqrt(_dot(travel, travel))
+    return sqrt(dot(travel, travel))
 
 
 @kernel(VOID, array(3), array(3), FLOAT, FLOAT, BOOL, FLOAT, output(2))
@@ -265,10 +261,10 @@ def _agreed(
         c, gaps = row[:3], row[6:9]
         _gaps(own[n], other[n], height, upright, relative, candidate, c, gaps)
         for i in range(3):
-            row[3 + i] = _dot(c, own[n, i])
+            row[3 + i] = dot(c, own[n, i])
             gaps[i] -= distance
             row[9 + i] = other[n, 0, i]
-        row[SHARE] = 0.5 - 0.5 * _dot(c, motion)
+        row[SHARE] = 0.5 - 0.5 * dot(c, motion)
 
 
 @part
@@ -278,7 +274,7 @@ def _bounds(
     """Return the least c·q of a control point, and the one that is wanted; ``point``: the committed one."""
     least = here - share * max(gap, 0.0)
     spared = here - share * max(gap - spare, 0.0)
-    return least, max(least, min(spared, _dot(normal, point)))
+    return least, max(least, min(spared, dot(normal, point)))
 
 
 @kernel(
@@ -321,7 +317,7 @@ def _planes(
             c = normals[m, n]
             _gaps(own[k, n], controls[k, n], heights[k], upright, relative, candidate, c, gaps)
             for i in range(3):
-                here, gap = _dot(c, own[k, n, i]), gaps[i] - distance[k, n]
+                here, gap = dot(c, own[k, n, i]), gaps[i] - distance[k, n]
                 least[m, n, i], wanted[m, n, i] = _bounds(c, here, gap, 1.0, spare, committed[n, i])
 
 
@@ -330,7 +326,7 @@ def _kept(normals: Array, least: Array, points: Array) -> bool:
     for m in range(len(normals)):
         for n in range(len(points)):
             for i in range(3):
-                if not _dot(normals[m, n], points[n, i]) >= least[m, n, i]:
+                if not dot(normals[m, n], points[n, i]) >= least[m, n, i]:
                     return False
     return True
 
@@ -341,6 +337,6 @@ def _keeps(points: Array, rows: Array) -> bool:
         row = rows[n]
         for i in range(3):
             least, _ = _bounds(row[:3], row[3 + i], row[6 + i], row[SHARE], 0.0, points[n, i])
-            if not _dot(row[:3], points[n, i]) >= least:
+            if not dot(row[:3], points[n, i]) >= least:
                 return False
     return True

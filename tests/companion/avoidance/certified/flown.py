@@ -113,6 +113,7 @@ class Flown:
             vehicle.plan(epoch) != carried_on(before, (epoch - before.epoch) // before.dt)
             for vehicle in self.vehicles
             for since, until, before in vehicle.stalled
+            if before is not None
             for epoch in self.epochs()
             if max(since, before.epoch - EPOCH) < epoch - EPOCH <= until
         )

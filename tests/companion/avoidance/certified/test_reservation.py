@@ -30,15 +30,16 @@ UP = np.array([0.0, 0.0, 1.0])
 def test_planes_are_upright_only_once_no_agreement_on_a_plan_in_space_is_kept() -> None:
     """Until then a column must not be flown, or become a plan in space, at another height."""
     two = agreed()
+    columns = ColumnAgreements(two.first)
     for number in (1, 2):
-        assert not ColumnAgreements(two.first).on_columns()
+        assert not columns.on_columns()
         for system, x in ((OWN, 0.0), (OTHER, 4.0)):
             two.make(system, plan(number, x)._replace(column=system == OWN))
-        assert not ColumnAgreements(two.first).on_columns()
+        assert not columns.on_columns()
         two.agree(NOW + number * LENGTH)
-        if ColumnAgreements(two.first).on_columns():
+        if columns.on_columns():
             break
-    assert ColumnAgreements(two.first).on_columns()
+    assert columns.on_columns()
 
 
 @pytest.mark.parametrize(("x", "clear"), [(1.2, False), (4.0, True), (None, False)])

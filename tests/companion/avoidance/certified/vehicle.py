@@ -62,11 +62,9 @@ class Vehicle:
         """Whether it kept planes that are not upright when its autopilot began to decide on its height."""
         self.busy_until = 0
         """Until when (µs of the run) its last step lasts."""
-        self.long: list[tuple[int, int]] = []
-        """From when till when (µs of the run) a step lasted that sent nothing."""
-        self.stalled: list[tuple[int, int, WirePlan]] = []
+        self.stalled: list[tuple[int, int, WirePlan | None]] = []
         """From when till when (µs of the run) a step lasted that sent nothing, and its newest plan until
-        then, which a backup node flies meanwhile."""
+        then, which a backup node flies meanwhile; None: it has told none yet."""
         self._handles = self._fly if habits.takes_off < 0 else self._stand
         self._begun: dict[int, int] = {}
 
@@ -112,9 +110,8 @@ class Vehicle:
         """Recall the step that began at ``since`` (µs of the run), see ``CertifiedFlight``."""
         recalled = self.flight.recall()
         if recalled:
-            self.long.append((since, self.busy_until))
-        if recalled and self.plans:
-            self.stalled.append((since, self.busy_until, self.plans[max(self.plans)]))
+            newest = self.plans[max(self.plans)] if self.plans else None
+            self.stalled.append((since, self.busy_until, newest))
         return recalled
 
     def held(self, epoch: int) -> WirePlan | None:
@@ -123,7 +120,7 @@ class Vehicle:
         In a step that lasted and sent nothing it carried the plan before on, which it may tell later.
         """
         since = epoch - EPOCH - self.habits.ahead
-        if epoch not in self.plans and any(begin < since <= end for begin, end in self.long):
+        if epoch not in self.plans and any(begin < since <= end for begin, end, _ in self.stalled):
             return self.plans.setdefault(epoch, self.plan(epoch))
         return self.plans.get(epoch)
 
